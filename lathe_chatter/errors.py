@@ -1,0 +1,27 @@
+"""The errors that lathe_chatter raises for a user's mistake: each is one readable sentence."""
+
+from __future__ import annotations
+
+
+class LatheChatterError(Exception):
+    """Base of every error that the package raises on purpose; its text is for people."""
+
+
+class ParameterError(LatheChatterError, ValueError):
+    """A value that the machine or the cut cannot have.
+
+    Attributes:
+        name: The field, as the user wrote it.
+        value: What was given.
+        unit: The unit of the field, empty where it has none.
+        allowed: What would have been accepted, as the end of a sentence.
+    """
+
+    def __init__(self, name: str, value: object, unit: str, allowed: str) -> None:
+        """Build the sentence from its parts."""
+        self.name = name
+        self.value = value
+        self.unit = unit
+        self.allowed = allowed
+        shown = repr(value) if isinstance(value, str) else str(value)
+        super().__init__(f'{name} is {shown}{unit and " " + unit}: it must be {allowed}.')
