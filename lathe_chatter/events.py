@@ -1,0 +1,82 @@
+"""Finds where a smooth function of a short piece of time first becomes negative."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from lathe_chatter.model import Array
+from lathe_chatter.propagation import slope_at, value_at
+
+NEVER = 2.0
+"""An answer beyond the piece [0, 1]."""
+_ITERATIONS = 60
+_CLOSE = 1e-15
+
+
+@njit(cache=True)
+def _root(series: Array, terms: int, sign: float, low: float, high: float) -> float:
+    """The root of sign * series between `low` (positive there) and `high` (negative)."""
+    place = 0.5 * (low + high)
+    for _ in range(_ITERATIONS):
+        value = sign * value_at(series, terms, place)
+        if value >= 0.0:
+            low = place
+        else:
+            high = place
+        slope = sign * slope_at(series, terms, place)
+        following = place - value / slope if slope != 0.0 else low - 1.0
+        if not low < following < high:  # Newton has left the bracket
+            following = 0.5 * (low + high)
+        if abs(following - place) <= _CLOSE:
+            return following
+        place = following
+    return place
+
+
+@njit(cache=True)
+def _turning_point(series: Array, terms: int, rising_first: bool) -> float:  # noqa: FBT001
+    """Where the slope changes sign between 0 and 1, by bisection: it happens twice a period."""
+    low, high = 0.0, 1.0
+    for _ in range(_ITERATIONS):
+        place = 0.5 * (low + high)
+        if (slope_at(series, terms, place) > 0.0) == rising_first:
+            low = place
+        else:
+            high = place
+        if high - low <= _CLOSE:
+            break
+    return 0.5 * (low + high)
+
+
+@njit(cache=True)
+def first_crossing(series: Array, terms: int, sign: float) -> float:
+    """Where sign * series, a margin that should stay positive, first falls below zero.
+
+    A piece is a small part of a vibration period (|lambda| dt <= 0.12), so the margin turns
+    at most once inside it. At 0 the margin may be zero but for rounding, just after an event.
+
+    Args:
+        series: Coefficients of the power series on [0, 1].
+        terms: How many of them.
+        sign: +1 or -1.
+
+    Returns:
+        The place in [0, 1], or `NEVER`.
+    """
+    start = sign * series[0]
+    end = sign * value_at(series, terms, 1.0)
+    slope_start = sign * series[1]
+    if end < 0.0:
+        if start > 0.0:
+            return _root(series, terms, sign, 0.0, 1.0)
+        if slope_start <= 0.0:
+            return 0.0
+        top = _turning_point(series, terms, sign > 0.0)
+        if sign * value_at(series, terms, top) <= 0.0:
+            return 0.0
+        return _root(series, terms, sign, top, 1.0)
+    if slope_start < 0.0 < sign * slope_at(series, terms, 1.0):
+        bottom = _turning_point(series, terms, sign < 0.0)
+        if sign * value_at(series, terms, bottom) < 0.0:
+            return _root(series, terms, sign, 0.0, bottom) if start > 0.0 else 0.0
+    return NEVER

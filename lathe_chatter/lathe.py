@@ -1,0 +1,360 @@
+"""`VirtualLathe`: a machine that cuts, can be retuned while it does, saved and continued."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter import propagation, stepper, surface
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.model import (
+    SAMPLE_COLUMNS,
+    Array,
+    BearingContact,
+    Cut,
+    Machine,
+    paper_initial_state,
+)
+from lathe_chatter.quantities import Quantity
+
+SAMPLE_RATE = Quantity('samples per simulated second', 'Hz', low=10.0, high=1e6)
+SPINDLE_ACCELERATION = Quantity(
+    'rate of change of the spindle speed, 0 for a step', 'rev/min per s', high=1e6
+)
+SEED = Quantity('seed of every random number', low=0.0, high=2.0**31 - 1.0)
+DISPLACEMENT_LIMIT = Quantity(
+    'displacement beyond which a run ends', 'm', high=1e12, exclusive=True
+)
+_STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)
+_IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
+_TURN_PER_STEP = 0.05
+
+
+class EventKind(IntEnum):
+    """What can happen inside a step."""
+
+    BEARING_ENGAGES = stepper.BEARING_ENGAGES
+    BEARING_RELEASES = stepper.BEARING_RELEASES
+    TOOL_LEAVES_CUT = stepper.TOOL_LEAVES
+    TOOL_ENTERS_CUT = stepper.TOOL_ENTERS
+
+
+class Event(NamedTuple):
+    """A located event: simulated time, s, and what happened."""
+
+    time: float
+    kind: EventKind
+
+
+@dataclass
+class LatheState:
+    """Everything that a lathe remembers, as one value.
+
+    Attributes:
+        cut: The parameters of the cut.
+        numbers: State, spindle angle, feed and speed (stepper.NUMBERS_SIZE,).
+        counts: Samples, turns and regimes (stepper.COUNTS_SIZE,).
+        nodes: The surface of the last turn (nodes, surface.NODE_SIZE).
+        guard: Why the run has ended, or an empty string.
+    """
+
+    cut: Cut
+    numbers: Array
+    counts: np.ndarray[tuple[int], np.dtype[np.int64]]
+    nodes: Array
+    guard: str = ''
+
+    def __eq__(self, other: object) -> bool:
+        """Equal bit for bit."""
+        if not isinstance(other, LatheState):
+            return NotImplemented
+        return (self.cut, self.guard) == (other.cut, other.guard) and all(
+            mine.tobytes() == theirs.tobytes()
+            for mine, theirs in (
+                (self.numbers, other.numbers),
+                (self.counts, other.counts),
+                (self.nodes, other.nodes),
+            )
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # a mutable value
+
+
+class VirtualLathe:
+    """A turning process with bearing clearance, integrated sample by sample.
+
+    The machine is that of the paper's equations (8)-(9). With `tool_leaves_cut` the cutting
+    force is F = C w max(h, 0), h = feed + r - (surface left before), and where the tool is out
+    of the cut the surface of earlier revolutions stays; without it the force is the paper's
+    linear one about the mean, equation (2). Speed changes need no restart: the delay is the
+    time since the spindle was one turn back.
+
+    Args:
+        machine: Tool, workpiece, bearing and material.
+        cut: What is cut at the start; see `retune`.
+        sample_rate: Samples per simulated second, Hz.
+        tool_leaves_cut: The force law, as above.
+        spindle_acceleration: rev/min per s at which the speed follows a change; 0 for a step.
+        seed: Of force noise and sensor noise.
+        initial_state: Tool displacement and velocity, workpiece displacement and velocity at
+            t = 0 (4,), m and m/s; by default the paper's. The surface before t = 0 is smooth.
+        displacement_limit: The run ends when a displacement passes it, m.
+
+    Raises:
+        ParameterError: If a value is not allowed.
+    """
+
+    def __init__(  # noqa: PLR0913 -- what cannot change later is named here
+        self,
+        machine: Machine | None = None,
+        cut: Cut | None = None,
+        *,
+        sample_rate: float = 1e4,
+        tool_leaves_cut: bool = True,
+        spindle_acceleration: float = 0.0,
+        seed: int = 0,
+        initial_state: Sequence[float] | Array | None = None,
+        displacement_limit: float = 1.0,
+    ) -> None:
+        """See the class."""
+        self.machine = machine or Machine()
+        self.sample_rate = SAMPLE_RATE.check('sample_rate', sample_rate)
+        self.tool_leaves_cut = bool(tool_leaves_cut)
+        self.spindle_acceleration = SPINDLE_ACCELERATION.check(
+            'spindle_acceleration', spindle_acceleration
+        )
+        self.seed = int(SEED.check('seed', seed))
+        self.displacement_limit = DISPLACEMENT_LIMIT.check(
+            'displacement_limit', displacement_limit
+        )
+        self.events: list[Event] = []
+        self._state = self._fresh(cut or Cut(), initial_state)
+        self._prepare()
+
+    # -- what it is doing ----------------------------------------------------------------
+
+    @property
+    def cut(self) -> Cut:
+        """The parameters of the cut in force."""
+        return self._state.cut
+
+    @property
+    def samples_taken(self) -> int:
+        """Samples since the start."""
+        return int(self._state.counts[stepper.SAMPLES])
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.samples_taken / self.sample_rate
+
+    @property
+    def spindle_angle(self) -> float:
+        """Revolutions since the start."""
+        return float(
+            self._state.counts[stepper.TURNS] + self._state.numbers[stepper.ANGLE]
+        )
+
+    @property
+    def bearing_engaged(self) -> bool:
+        """Whether the workpiece touches its bearing across the clearance."""
+        return bool(self._state.counts[stepper.REGIME] & propagation.ENGAGED)
+
+    @property
+    def tool_in_cut(self) -> bool:
+        """Whether the tool removes material."""
+        return bool(self._state.counts[stepper.REGIME] & propagation.IN_CUT)
+
+    @property
+    def guard(self) -> str:
+        """Why the run has ended, as a sentence; empty while it goes on."""
+        return self._state.guard
+
+    # -- what it can be told ---------------------------------------------------------------
+
+    def advance(self, samples: int) -> Array:
+        """Cut on for a number of samples.
+
+        The events located on the way are left in `events`.
+
+        Args:
+            samples: How many, 0 or more.
+
+        Returns:
+            The samples (n, 8), columns as in `model.SAMPLE_COLUMNS`. Fewer than asked for,
+            and `guard` says why, once a displacement has passed its limit.
+
+        Raises:
+            ParameterError: If `samples` is negative.
+        """
+        if samples < 0:
+            raise ParameterError('samples', samples, '', 'a whole number of 0 or more')
+        out = np.empty((0 if self.guard else samples, len(SAMPLE_COLUMNS)))
+        state = self._state
+        rows, found, status, state.nodes, events = stepper.advance(
+            state.numbers,
+            state.counts,
+            state.nodes,
+            self._settings,
+            self._mechanics,
+            self._matrices,
+            self.seed,
+            out,
+            self._event_space,
+        )
+        self._event_space = events
+        self.events = [
+            Event(int(before) / self.sample_rate + since, EventKind(int(kind)))
+            for before, since, kind in events[:found]
+        ]
+        if status == stepper.GUARD:
+            time = (self.samples_taken + 1) / self.sample_rate
+            state.guard = (
+                f'The run ended at {time:.4f} s: a displacement passed '
+                f'{self.displacement_limit:g} m, beyond which this machine has no meaning.'
+            )
+        return out[:rows]
+
+    def retune(self, cut: Cut) -> None:
+        """Change the cut at the instant of the last sample; nothing is restarted."""
+        if cut == self.cut:
+            return
+        old = self.cut
+        self._state.cut = cut
+        self._prepare()
+        contact_changed = (cut.bearing_contact, cut.bearing_clearance) != (
+            old.bearing_contact,
+            old.bearing_clearance,
+        )
+        if contact_changed:
+            self._settle_regime()
+        self._corner(1)
+
+    def knock(self, impulse: float) -> None:
+        """Hit the tool at the instant of the last sample: its velocity jumps by impulse / m_t.
+
+        Args:
+            impulse: N s, positive towards greater chip thickness.
+
+        Raises:
+            ParameterError: If it is not finite or beyond 1000 N s.
+        """
+        impulse = _IMPULSE.check('impulse', impulse)
+        self._state.numbers[stepper.TOOL_V] += impulse / self.machine.tool.mass
+        self._corner(1)
+
+    def snapshot(self) -> LatheState:
+        """A copy of everything that the lathe remembers."""
+        state = copy.deepcopy(self._state)
+        state.nodes = state.nodes[: int(state.counts[stepper.HEAD]) + 1].copy()
+        return state
+
+    def restore(self, state: LatheState) -> None:
+        """Continue from a snapshot, bit for bit.
+
+        The lathe must have the same machine, sample rate, force law, acceleration and seed.
+        """
+        self._state = copy.deepcopy(state)
+        self.events = []
+        self._prepare()
+
+    # -- how ------------------------------------------------------------------------------
+
+    def _fresh(self, cut: Cut, initial_state: Sequence[float] | Array | None) -> LatheState:
+        """The state at t = 0, with a smooth surface of the turn before."""
+        given = paper_initial_state(cut) if initial_state is None else initial_state
+        start = np.array([_STATE.check('initial_state', value) for value in given])
+        if start.shape != (4,):
+            raise ParameterError('initial_state', given, '', 'four numbers')
+        numbers = np.zeros(stepper.NUMBERS_SIZE)
+        numbers[:4] = start
+        speed = cut.spindle_speed_rpm / 60.0
+        numbers[stepper.SPEED] = speed
+        feed = cut.feed_speed / speed if self.tool_leaves_cut else 0.0
+        offset = start[0] - start[2]
+        nodes = surface.fresh_surface(feed, 512)
+        nodes[:2, surface.HEIGHT] += offset
+        numbers[stepper.MET], numbers[stepper.MET_SLOPE] = offset - feed, feed
+        counts = np.zeros(stepper.COUNTS_SIZE, dtype=np.int64)
+        counts[stepper.HEAD], counts[stepper.BREAK] = 1, 1
+        counts[stepper.REGIME] = propagation.IN_CUT
+        state = LatheState(cut, numbers, counts, nodes)
+        self._event_space = np.empty((64, 3))
+        self._state = state
+        self._settle_regime()
+        return state
+
+    def _settle_regime(self) -> None:
+        """Decide from the state whether the bearing carries, after its clearance was set."""
+        state, contact = self._state, self.cut.bearing_contact
+        engaged = contact is BearingContact.SEATED or (
+            contact is BearingContact.GAP
+            and state.numbers[stepper.WORKPIECE_X] >= self.cut.bearing_clearance
+        )
+        state.counts[stepper.REGIME] &= ~propagation.ENGAGED
+        if engaged:
+            state.counts[stepper.REGIME] |= propagation.ENGAGED
+
+    def _corner(self, order: int) -> None:
+        """Note that derivative `order` of the surface jumps here."""
+        counts = self._state.counts
+        counts[stepper.BREAK] = min(counts[stepper.BREAK] or order, order)
+
+    def _prepare(self) -> None:
+        """Turn machine and cut into the constants of the inner loop."""
+        machine, cut, state = self.machine, self.cut, self._state
+        tool, workpiece = machine.tool, machine.workpiece
+        cutting = machine.cutting_stiffness(cut.depth_of_cut)
+        mechanics = np.empty(propagation.MECHANICS_SIZE)
+        mechanics[propagation.TOOL_STIFFNESS] = tool.natural_frequency**2
+        mechanics[propagation.TOOL_DAMPING] = tool.damping / tool.mass
+        mechanics[propagation.TOOL_CUTTING] = cutting / tool.mass
+        mechanics[propagation.TOOL_COMPLIANCE] = 1.0 / tool.mass
+        mechanics[propagation.WORKPIECE_STIFFNESS] = workpiece.natural_frequency**2
+        mechanics[propagation.WORKPIECE_DAMPING] = workpiece.damping / workpiece.mass
+        mechanics[propagation.WORKPIECE_CUTTING] = cutting / workpiece.mass
+        mechanics[propagation.BEARING_STIFFNESS] = machine.bearing_stiffness / workpiece.mass
+        mechanics[propagation.CLEARANCE] = cut.bearing_clearance
+
+        speed = cut.spindle_speed_rpm / 60.0
+        if self.spindle_acceleration == 0.0:
+            state.numbers[stepper.SPEED] = speed
+        settings = np.empty(stepper.SETTINGS_SIZE)
+        settings[stepper.SAMPLE_RATE] = self.sample_rate
+        settings[stepper.STEPS_PER_SAMPLE] = steps = self._steps_per_sample(speed)
+        settings[stepper.TARGET_SPEED] = speed
+        settings[stepper.ACCELERATION] = self.spindle_acceleration / 60.0
+        settings[stepper.VARIATION] = cut.speed_variation_amplitude
+        settings[stepper.VARIATION_FREQUENCY] = cut.speed_variation_frequency
+        settings[stepper.FEED_SPEED] = cut.feed_speed if self.tool_leaves_cut else 0.0
+        settings[stepper.CUTTING_STIFFNESS] = cutting
+        settings[stepper.NOMINAL_FEED_SPEED] = cut.feed_speed
+        settings[stepper.MAY_LEAVE_CUT] = self.tool_leaves_cut
+        settings[stepper.HAS_CLEARANCE] = cut.bearing_contact is BearingContact.GAP
+        settings[stepper.FORCE_NOISE] = cut.force_noise
+        settings[stepper.SENSOR_NOISE] = cut.sensor_noise
+        settings[stepper.RUNOUT] = cut.runout
+        settings[stepper.LIMIT] = self.displacement_limit
+        self._settings, self._mechanics = settings, mechanics
+        self._matrices = propagation.step_matrices(1.0 / (self.sample_rate * steps), mechanics)
+
+    def _steps_per_sample(self, target_speed: float) -> int:
+        """Steps so short that the series converge and that a turn has many of them."""
+        machine, cut = self.machine, self.cut
+        cutting = machine.cutting_stiffness(cut.depth_of_cut)
+        stiffness = machine.workpiece_stiffness(seated=True) + cutting
+        fastest = math.hypot(
+            math.sqrt((machine.tool.stiffness + cutting) / machine.tool.mass),
+            math.sqrt(cutting / machine.workpiece.mass),
+        )
+        fastest = max(fastest, math.sqrt(stiffness / machine.workpiece.mass))
+        speed = max(target_speed, self._state.numbers[stepper.SPEED])
+        speed *= 1.0 + cut.speed_variation_amplitude
+        needed = max(fastest / propagation.RATE_STEP, speed / _TURN_PER_STEP)
+        return max(1, math.ceil(needed / self.sample_rate))

@@ -1,0 +1,93 @@
+"""What the last revolution left on the workpiece, kept against spindle angle.
+
+The surface is a chain of quintics over spindle angle. Each node carries the surface S with its
+first two derivatives by angle on either side, because a knock, a retune or an event leaves a
+corner; S is measured from where the feed stood when the current turn began. Positions are in
+revolutions of the current turn: the surface that the tool meets at angle phi stands at phi - 1.
+
+A node also says of which derivative it carries a jump (`ORDER`). One turn later a jump in
+derivative q of the surface is a jump in derivative q + 2 of the motion, since it enters through
+a force: after a few turns it is smoother than a quintic can tell, and is dropped.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from lathe_chatter.model import Array
+
+# One node is one cache line of 8 numbers.
+(
+    ANGLE,  # rev, of the current turn; the turn before is negative
+    HEIGHT,  # S, m
+    SLOPE_BEFORE,  # dS/dphi on the side of smaller angle, m/rev
+    CURVATURE_BEFORE,  # d2S/dphi2 there, m/rev2
+    SLOPE_AFTER,
+    CURVATURE_AFTER,
+    ORDER,  # lowest derivative of S that jumps here, or SMOOTH
+    PITCH,  # rev per whole step when the surface was cut: how finely it is described
+) = range(8)
+NODE_SIZE = 8
+
+SMOOTH = 99.0
+LAST_ORDER = 4.0
+"""Jumps in higher derivatives than this are below the quintic's own error."""
+MERGE = 1e-9
+"""Two instants closer than this part of a step are one."""
+
+
+def fresh_surface(slope: float, capacity: int) -> Array:
+    """A smooth surface before the first turn: S = slope * phi for phi <= 0 (capacity, 8)."""
+    nodes = np.zeros((capacity, NODE_SIZE))
+    nodes[:2, ANGLE] = -1.0, 0.0
+    nodes[:2, HEIGHT] = -slope, 0.0
+    nodes[:2, SLOPE_BEFORE] = nodes[:2, SLOPE_AFTER] = slope
+    nodes[:2, ORDER] = SMOOTH
+    nodes[:2, PITCH] = math.inf
+    return nodes
+
+
+@njit(cache=True)
+def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
+    """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
+    width = nodes[left + 1, ANGLE] - nodes[left, ANGLE]
+    place = (angle - nodes[left, ANGLE]) / width
+    d0 = nodes[left, SLOPE_AFTER] * width
+    e0 = nodes[left, CURVATURE_AFTER] * width * width
+    rise = nodes[left + 1, HEIGHT] - nodes[left, HEIGHT] - d0 - 0.5 * e0
+    steep = nodes[left + 1, SLOPE_BEFORE] * width - d0 - e0
+    bend = nodes[left + 1, CURVATURE_BEFORE] * width * width - e0
+    c3 = 10.0 * rise - 4.0 * steep + 0.5 * bend
+    c4 = -15.0 * rise + 7.0 * steep - bend
+    c5 = 6.0 * rise - 3.0 * steep + 0.5 * bend
+    height = nodes[left, HEIGHT] + place * (
+        d0 + place * (0.5 * e0 + place * (c3 + place * (c4 + place * c5)))
+    )
+    slope = d0 + place * (e0 + place * (3.0 * c3 + place * (4.0 * c4 + place * 5.0 * c5)))
+    curvature = e0 + place * (6.0 * c3 + place * (12.0 * c4 + place * 20.0 * c5))
+    return height, slope / width, curvature / (width * width)
+
+
+@njit(cache=True)
+def grown(nodes: Array) -> Array:
+    """The same nodes with room for twice as many."""
+    larger = np.zeros((2 * nodes.shape[0], NODE_SIZE))
+    larger[: nodes.shape[0]] = nodes
+    return larger
+
+
+@njit(cache=True)
+def next_turn(nodes: Array, first: int, last: int, advance: float) -> None:
+    """Forget what lies before node `first`, and count angle and feed from the new turn on.
+
+    Rebasing once a turn keeps angles below 2 rev and heights near one feed, so that an hour
+    of cutting is as exact as its first second, and the memory is that of one turn.
+    """
+    for node in range(first, last + 1):
+        for entry in range(NODE_SIZE):
+            nodes[node - first, entry] = nodes[node, entry]
+        nodes[node - first, ANGLE] -= 1.0
+        nodes[node - first, HEIGHT] -= advance
