@@ -5,7 +5,9 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = 'lathe_chatter'
-CONFIG = sorted(folder for folder in [Path('config'), *Path('config').rglob('*')] if folder.is_dir())
+CONFIG = sorted(
+    folder for folder in [Path('config'), *Path('config').rglob('*')] if folder.is_dir()
+)
 
 setup(
     name=NAME,
@@ -25,8 +27,13 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
+        # `ros2 run` looks here; pip alone would put the executables only on PATH.
+        (f'lib/{NAME}', sorted(str(file) for file in Path('scripts/ros2_run').iterdir())),
         *(
-            (f'share/{NAME}/{folder}', [str(file) for file in sorted(folder.iterdir()) if file.is_file()])
+            (
+                f'share/{NAME}/{folder}',
+                [str(file) for file in sorted(folder.iterdir()) if file.is_file()],
+            )
             for folder in CONFIG
         ),
     ],

@@ -25,3 +25,7 @@ class ParameterError(LatheChatterError, ValueError):
         self.allowed = allowed
         shown = repr(value) if isinstance(value, str) else str(value)
         super().__init__(f'{name} is {shown}{unit and " " + unit}: it must be {allowed}.')
+
+
+class LayoutError(LatheChatterError, ValueError):
+    """A block of samples whose layout is not that of the contract."""

@@ -13,7 +13,7 @@ _ITERATIONS = 60
 _CLOSE = 1e-15
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def _root(series: Array, terms: int, sign: float, low: float, high: float) -> float:
     """The root of sign * series between `low` (positive there) and `high` (negative)."""
     place = 0.5 * (low + high)
@@ -33,7 +33,7 @@ def _root(series: Array, terms: int, sign: float, low: float, high: float) -> fl
     return place
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def _turning_point(series: Array, terms: int, rising_first: bool) -> float:  # noqa: FBT001
     """Where the slope changes sign between 0 and 1, by bisection: it happens twice a period."""
     low, high = 0.0, 1.0
@@ -48,7 +48,7 @@ def _turning_point(series: Array, terms: int, rising_first: bool) -> float:  # n
     return 0.5 * (low + high)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def first_crossing(series: Array, terms: int, sign: float) -> float:
     """Where sign * series, a margin that should stay positive, first falls below zero.
 
@@ -80,3 +80,15 @@ def first_crossing(series: Array, terms: int, sign: float) -> float:
         if sign * value_at(series, terms, bottom) < 0.0:
             return _root(series, terms, sign, 0.0, bottom) if start > 0.0 else 0.0
     return NEVER
+
+
+@njit(cache=True, error_model='numpy', inline='always')
+def may_turn_back(
+    start: float, slope: float, end: float, slope_end: float, duration: float
+) -> bool:
+    """Whether a margin may become negative in a piece; False is certain.
+
+    Either it is negative at the end, or it turns inside and its tangent at the start, which
+    lies below the curve, would take it below zero.
+    """
+    return end < 0.0 or (slope < 0.0 < slope_end and start + slope * duration < 0.0)

@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter import propagation, stepper, surface
+from lathe_chatter import layout, propagation, stepper, surface
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import (
     SAMPLE_COLUMNS,
     Array,
     BearingContact,
     Cut,
+    Integers,
     Machine,
     paper_initial_state,
 )
@@ -39,10 +40,10 @@ _TURN_PER_STEP = 0.05
 class EventKind(IntEnum):
     """What can happen inside a step."""
 
-    BEARING_ENGAGES = stepper.BEARING_ENGAGES
-    BEARING_RELEASES = stepper.BEARING_RELEASES
-    TOOL_LEAVES_CUT = stepper.TOOL_LEAVES
-    TOOL_ENTERS_CUT = stepper.TOOL_ENTERS
+    BEARING_ENGAGES = layout.BEARING_ENGAGES
+    BEARING_RELEASES = layout.BEARING_RELEASES
+    TOOL_LEAVES_CUT = layout.TOOL_LEAVES
+    TOOL_ENTERS_CUT = layout.TOOL_ENTERS
 
 
 class Event(NamedTuple):
@@ -58,15 +59,15 @@ class LatheState:
 
     Attributes:
         cut: The parameters of the cut.
-        numbers: State, spindle angle, feed and speed (stepper.NUMBERS_SIZE,).
-        counts: Samples, turns and regimes (stepper.COUNTS_SIZE,).
+        numbers: State, spindle angle, feed and speed (layout.NUMBERS_SIZE,).
+        counts: Samples, turns and regimes (layout.COUNTS_SIZE,).
         nodes: The surface of the last turn (nodes, surface.NODE_SIZE).
         guard: Why the run has ended, or an empty string.
     """
 
     cut: Cut
     numbers: Array
-    counts: np.ndarray[tuple[int], np.dtype[np.int64]]
+    counts: Integers
     nodes: Array
     guard: str = ''
 
@@ -84,6 +85,15 @@ class LatheState:
         )
 
     __hash__ = None  # type: ignore[assignment]  # a mutable value
+
+
+def _settle_regime(state: LatheState) -> None:
+    """Decide from the displacement whether the bearing carries, after its clearance was set."""
+    contact = state.cut.bearing_contact
+    touches = state.numbers[layout.WORKPIECE_X] >= state.cut.bearing_clearance
+    state.counts[layout.REGIME] &= ~propagation.ENGAGED
+    if contact is BearingContact.SEATED or (contact is BearingContact.GAP and touches):
+        state.counts[layout.REGIME] |= propagation.ENGAGED
 
 
 class VirtualLathe:
@@ -134,7 +144,9 @@ class VirtualLathe:
             'displacement_limit', displacement_limit
         )
         self.events: list[Event] = []
+        self._event_space: Array = np.empty((64, 3))
         self._state = self._fresh(cut or Cut(), initial_state)
+        self._choose_steps()
         self._prepare()
 
     # -- what it is doing ----------------------------------------------------------------
@@ -147,7 +159,7 @@ class VirtualLathe:
     @property
     def samples_taken(self) -> int:
         """Samples since the start."""
-        return int(self._state.counts[stepper.SAMPLES])
+        return int(self._state.counts[layout.SAMPLES])
 
     @property
     def time(self) -> float:
@@ -157,19 +169,17 @@ class VirtualLathe:
     @property
     def spindle_angle(self) -> float:
         """Revolutions since the start."""
-        return float(
-            self._state.counts[stepper.TURNS] + self._state.numbers[stepper.ANGLE]
-        )
+        return float(self._state.counts[layout.TURNS] + self._state.numbers[layout.ANGLE])
 
     @property
     def bearing_engaged(self) -> bool:
         """Whether the workpiece touches its bearing across the clearance."""
-        return bool(self._state.counts[stepper.REGIME] & propagation.ENGAGED)
+        return bool(self._state.counts[layout.REGIME] & propagation.ENGAGED)
 
     @property
     def tool_in_cut(self) -> bool:
         """Whether the tool removes material."""
-        return bool(self._state.counts[stepper.REGIME] & propagation.IN_CUT)
+        return bool(self._state.counts[layout.REGIME] & propagation.IN_CUT)
 
     @property
     def guard(self) -> str:
@@ -196,26 +206,22 @@ class VirtualLathe:
         if samples < 0:
             raise ParameterError('samples', samples, '', 'a whole number of 0 or more')
         out = np.empty((0 if self.guard else samples, len(SAMPLE_COLUMNS)))
-        state = self._state
-        rows, found, status, state.nodes, events = stepper.advance(
-            state.numbers,
-            state.counts,
-            state.nodes,
-            self._settings,
-            self._mechanics,
-            self._matrices,
-            self.seed,
-            out,
-            self._event_space,
-        )
-        self._event_space = events
-        self.events = [
-            Event(int(before) / self.sample_rate + since, EventKind(int(kind)))
-            for before, since, kind in events[:found]
-        ]
-        if status == stepper.GUARD:
+        self.events = []
+        rows, status = 0, layout.SURFACE_FULL
+        while status in {layout.SURFACE_FULL, layout.EVENTS_FULL}:
+            done, found, status = self._call(out[rows:])
+            rows += done
+            self.events += [
+                Event(int(before) / self.sample_rate + since, EventKind(int(kind)))
+                for before, since, kind in self._event_space[:found]
+            ]
+            if status == layout.SURFACE_FULL:
+                self._state.nodes = surface.grown(self._state.nodes)
+            elif status == layout.EVENTS_FULL:
+                self._event_space = np.empty((2 * len(self._event_space), 3))
+        if status == layout.GUARD:
             time = (self.samples_taken + 1) / self.sample_rate
-            state.guard = (
+            self._state.guard = (
                 f'The run ended at {time:.4f} s: a displacement passed '
                 f'{self.displacement_limit:g} m, beyond which this machine has no meaning.'
             )
@@ -227,13 +233,14 @@ class VirtualLathe:
             return
         old = self.cut
         self._state.cut = cut
+        self._choose_steps()
         self._prepare()
         contact_changed = (cut.bearing_contact, cut.bearing_clearance) != (
             old.bearing_contact,
             old.bearing_clearance,
         )
         if contact_changed:
-            self._settle_regime()
+            _settle_regime(self._state)
         self._corner(1)
 
     def knock(self, impulse: float) -> None:
@@ -246,13 +253,13 @@ class VirtualLathe:
             ParameterError: If it is not finite or beyond 1000 N s.
         """
         impulse = _IMPULSE.check('impulse', impulse)
-        self._state.numbers[stepper.TOOL_V] += impulse / self.machine.tool.mass
+        self._state.numbers[layout.TOOL_V] += impulse / self.machine.tool.mass
         self._corner(1)
 
     def snapshot(self) -> LatheState:
         """A copy of everything that the lathe remembers."""
         state = copy.deepcopy(self._state)
-        state.nodes = state.nodes[: int(state.counts[stepper.HEAD]) + 1].copy()
+        state.nodes = state.nodes[: int(state.counts[layout.HEAD]) + 1].copy()
         return state
 
     def restore(self, state: LatheState) -> None:
@@ -266,45 +273,48 @@ class VirtualLathe:
 
     # -- how ------------------------------------------------------------------------------
 
+    def _call(self, out: Array) -> tuple[int, int, int]:
+        """Run the inner loop on `out`: samples, events, and how it ended."""
+        state = self._state
+        done, found, status = stepper.advance(
+            state.numbers,
+            state.counts,
+            state.nodes,
+            self._settings,
+            self._mechanics,
+            self._matrices,
+            self.seed,
+            out,
+            self._event_space,
+        )
+        return int(done), int(found), int(status)
+
     def _fresh(self, cut: Cut, initial_state: Sequence[float] | Array | None) -> LatheState:
         """The state at t = 0, with a smooth surface of the turn before."""
         given = paper_initial_state(cut) if initial_state is None else initial_state
         start = np.array([_STATE.check('initial_state', value) for value in given])
         if start.shape != (4,):
             raise ParameterError('initial_state', given, '', 'four numbers')
-        numbers = np.zeros(stepper.NUMBERS_SIZE)
+        numbers = np.zeros(layout.NUMBERS_SIZE)
         numbers[:4] = start
         speed = cut.spindle_speed_rpm / 60.0
-        numbers[stepper.SPEED] = speed
+        numbers[layout.SPEED] = speed
         feed = cut.feed_speed / speed if self.tool_leaves_cut else 0.0
         offset = start[0] - start[2]
         nodes = surface.fresh_surface(feed, 512)
         nodes[:2, surface.HEIGHT] += offset
-        numbers[stepper.MET], numbers[stepper.MET_SLOPE] = offset - feed, feed
-        counts = np.zeros(stepper.COUNTS_SIZE, dtype=np.int64)
-        counts[stepper.HEAD], counts[stepper.BREAK] = 1, 1
-        counts[stepper.REGIME] = propagation.IN_CUT
+        numbers[layout.MET], numbers[layout.MET_SLOPE] = offset - feed, feed
+        counts = np.zeros(layout.COUNTS_SIZE, dtype=np.int64)
+        counts[layout.HEAD], counts[layout.CORNER] = 1, 1
+        counts[layout.REGIME] = propagation.IN_CUT
         state = LatheState(cut, numbers, counts, nodes)
-        self._event_space = np.empty((64, 3))
-        self._state = state
-        self._settle_regime()
+        _settle_regime(state)
         return state
-
-    def _settle_regime(self) -> None:
-        """Decide from the state whether the bearing carries, after its clearance was set."""
-        state, contact = self._state, self.cut.bearing_contact
-        engaged = contact is BearingContact.SEATED or (
-            contact is BearingContact.GAP
-            and state.numbers[stepper.WORKPIECE_X] >= self.cut.bearing_clearance
-        )
-        state.counts[stepper.REGIME] &= ~propagation.ENGAGED
-        if engaged:
-            state.counts[stepper.REGIME] |= propagation.ENGAGED
 
     def _corner(self, order: int) -> None:
         """Note that derivative `order` of the surface jumps here."""
         counts = self._state.counts
-        counts[stepper.BREAK] = min(counts[stepper.BREAK] or order, order)
+        counts[layout.CORNER] = min(counts[layout.CORNER] or order, order)
 
     def _prepare(self) -> None:
         """Turn machine and cut into the constants of the inner loop."""
@@ -324,37 +334,39 @@ class VirtualLathe:
 
         speed = cut.spindle_speed_rpm / 60.0
         if self.spindle_acceleration == 0.0:
-            state.numbers[stepper.SPEED] = speed
-        settings = np.empty(stepper.SETTINGS_SIZE)
-        settings[stepper.SAMPLE_RATE] = self.sample_rate
-        settings[stepper.STEPS_PER_SAMPLE] = steps = self._steps_per_sample(speed)
-        settings[stepper.TARGET_SPEED] = speed
-        settings[stepper.ACCELERATION] = self.spindle_acceleration / 60.0
-        settings[stepper.VARIATION] = cut.speed_variation_amplitude
-        settings[stepper.VARIATION_FREQUENCY] = cut.speed_variation_frequency
-        settings[stepper.FEED_SPEED] = cut.feed_speed if self.tool_leaves_cut else 0.0
-        settings[stepper.CUTTING_STIFFNESS] = cutting
-        settings[stepper.NOMINAL_FEED_SPEED] = cut.feed_speed
-        settings[stepper.MAY_LEAVE_CUT] = self.tool_leaves_cut
-        settings[stepper.HAS_CLEARANCE] = cut.bearing_contact is BearingContact.GAP
-        settings[stepper.FORCE_NOISE] = cut.force_noise
-        settings[stepper.SENSOR_NOISE] = cut.sensor_noise
-        settings[stepper.RUNOUT] = cut.runout
-        settings[stepper.LIMIT] = self.displacement_limit
+            state.numbers[layout.SPEED] = speed
+        settings = np.empty(layout.SETTINGS_SIZE)
+        settings[layout.SAMPLE_RATE] = self.sample_rate
+        settings[layout.TARGET_SPEED] = speed
+        settings[layout.ACCELERATION] = self.spindle_acceleration / 60.0
+        settings[layout.VARIATION] = cut.speed_variation_amplitude
+        settings[layout.VARIATION_FREQUENCY] = cut.speed_variation_frequency
+        settings[layout.FEED_SPEED] = cut.feed_speed if self.tool_leaves_cut else 0.0
+        settings[layout.CUTTING_STIFFNESS] = cutting
+        settings[layout.NOMINAL_FEED_SPEED] = cut.feed_speed
+        settings[layout.MAY_LEAVE_CUT] = self.tool_leaves_cut
+        settings[layout.HAS_CLEARANCE] = cut.bearing_contact is BearingContact.GAP
+        settings[layout.FORCE_NOISE] = cut.force_noise
+        settings[layout.SENSOR_NOISE] = cut.sensor_noise
+        settings[layout.RUNOUT] = cut.runout
+        settings[layout.LIMIT] = self.displacement_limit
         self._settings, self._mechanics = settings, mechanics
-        self._matrices = propagation.step_matrices(1.0 / (self.sample_rate * steps), mechanics)
+        step = 1.0 / (self.sample_rate * state.counts[layout.STEPS])
+        self._matrices = propagation.step_matrices(step, mechanics)
 
-    def _steps_per_sample(self, target_speed: float) -> int:
-        """Steps so short that the series converge and that a turn has many of them."""
-        machine, cut = self.machine, self.cut
+    def _choose_steps(self) -> None:
+        """Steps so short that the series converge and that a turn has many of them.
+
+        Chosen when the cut changes and then remembered: a restored run takes the same steps.
+        """
+        machine, cut, state = self.machine, self.cut, self._state
         cutting = machine.cutting_stiffness(cut.depth_of_cut)
-        stiffness = machine.workpiece_stiffness(seated=True) + cutting
-        fastest = math.hypot(
-            math.sqrt((machine.tool.stiffness + cutting) / machine.tool.mass),
-            math.sqrt(cutting / machine.workpiece.mass),
+        on_workpiece = machine.workpiece_stiffness(seated=True) + 2.0 * cutting
+        on_tool = machine.tool.stiffness + 2.0 * cutting
+        fastest = math.sqrt(
+            max(on_tool / machine.tool.mass, on_workpiece / machine.workpiece.mass)
         )
-        fastest = max(fastest, math.sqrt(stiffness / machine.workpiece.mass))
-        speed = max(target_speed, self._state.numbers[stepper.SPEED])
+        speed = max(cut.spindle_speed_rpm / 60.0, float(state.numbers[layout.SPEED]))
         speed *= 1.0 + cut.speed_variation_amplitude
         needed = max(fastest / propagation.RATE_STEP, speed / _TURN_PER_STEP)
-        return max(1, math.ceil(needed / self.sample_rate))
+        state.counts[layout.STEPS] = max(1, math.ceil(needed / self.sample_rate))

@@ -24,6 +24,7 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.quantities import check_choice, check_fields, quantity
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 STATE_FIELDS = (
     'tool_displacement',

@@ -3,7 +3,8 @@
 Within a piece neither contact nor cutting changes, so the machine is linear with the surface
 U(t) that the tool meets as its only input, and the displacements are power series in time:
 
-    (k+2)(k+1) a_{k+2} = dt^2 [xi/m - omega^2 a_k - C w/m (a_k - b_k - U_k)] - 2 zeta omega dt (k+1) a_{k+1}
+    (k+2)(k+1) a_{k+2} = dt^2 [xi/m - omega^2 a_k - C w/m (a_k - b_k - U_k)]
+                         - 2 zeta omega dt (k+1) a_{k+1}
 
 for the tool, and with the bearing for the workpiece b (equations (8a) and (8b), term by term).
 With |lambda| dt <= 0.12 the terms fall faster than 0.12^k/k!, so the series ends at rounding
@@ -46,7 +47,7 @@ REGIMES = 4
 """A regime is the sum of IN_CUT and ENGAGED where they hold."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def quintic(  # noqa: PLR0913, PLR0917 -- value and two derivatives at both ends
     u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array
 ) -> None:
@@ -62,7 +63,7 @@ def quintic(  # noqa: PLR0913, PLR0917 -- value and two derivatives at both ends
     out[5] = 6.0 * rise - 3.0 * steep + 0.5 * bend
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def solve_piece(  # noqa: PLR0913, PLR0917 -- the inner loop takes plain numbers
     state: Array,
     duration: float,
@@ -115,25 +116,25 @@ def solve_piece(  # noqa: PLR0913, PLR0917 -- the inner loop takes plain numbers
         )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def value_at(series: Array, terms: int, place: float) -> float:
     """A power series at `place`."""
-    total = series[terms - 1]
+    total: float = series[terms - 1]
     for k in range(terms - 2, -1, -1):
         total = total * place + series[k]
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def slope_at(series: Array, terms: int, place: float) -> float:
     """The derivative of a power series at `place`."""
-    total = (terms - 1) * series[terms - 1]
+    total: float = (terms - 1) * series[terms - 1]
     for k in range(terms - 2, 0, -1):
         total = total * place + k * series[k]
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def end_state(tool: Array, workpiece: Array, duration: float, state: Array) -> None:
     """Write the state (4,) at the end of a solved piece."""
     state[0] = value_at(tool, TERMS, 1.0)
@@ -142,15 +143,37 @@ def end_state(tool: Array, workpiece: Array, duration: float, state: Array) -> N
     state[3] = slope_at(workpiece, TERMS, 1.0) / duration
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy', inline='always')
+def whole_step(  # noqa: PLR0913, PLR0917 -- plain arrays
+    state: Array, ends: Array, matrices: Array, regime: int, force: float, end: Array
+) -> None:
+    """Write the state (4,) after a whole step, by `step_matrices`.
+
+    `ends` holds the surface with its first two derivatives by time at both ends (6,).
+    """
+    x0, x1, x2, x3 = state[0], state[1], state[2], state[3]
+    u0, u1, u2, u3, u4, u5 = ends[0], ends[1], ends[2], ends[3], ends[4], ends[5]
+    for k in range(4):
+        end[k] = (
+            (matrices[regime, 0, k] * x0 + matrices[regime, 1, k] * x1)
+            + (matrices[regime, 2, k] * x2 + matrices[regime, 3, k] * x3)
+        ) + (
+            (matrices[regime, 4, k] * u0 + matrices[regime, 5, k] * u1)
+            + (matrices[regime, 6, k] * u2 + matrices[regime, 7, k] * u3)
+            + (matrices[regime, 8, k] * u4 + matrices[regime, 9, k] * u5)
+            + (matrices[regime, 10, k] * force + matrices[regime, 11, k])
+        )
+
+
+@njit(cache=True, error_model='numpy')
 def step_matrices(step: float, mechanics: Array) -> Array:
-    """The exact response (REGIMES, 4, INPUTS) of the state after a whole step to each input.
+    """The exact response (REGIMES, INPUTS, 4) of the state after a whole step to each input.
 
     Inputs: the state (4), then U, U' and U'' at the start and U, U' and U'' at the end of the
     step (6, in SI), a constant force of 1 N on the tool, and the number 1 (the bearing's
     clearance). The columns are sums of the same series as a piece: no second method.
     """
-    result = np.zeros((REGIMES, 4, INPUTS))
+    result = np.zeros((REGIMES, INPUTS, 4))
     tool, workpiece = np.zeros(TERMS), np.zeros(TERMS)
     surface, state, ends = np.zeros(6), np.zeros(4), np.zeros(6)
     bare = mechanics.copy()
@@ -171,5 +194,5 @@ def step_matrices(step: float, mechanics: Array) -> Array:
             constants = mechanics if source == 11 else bare
             solve_piece(state, step, regime, constants, force, surface, tool, workpiece)
             end_state(tool, workpiece, step, state)
-            result[regime, :, source] = state
+            result[regime, source] = state
     return result

@@ -15,7 +15,7 @@ from numba import njit
 _NEWTON_STEPS = 20
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def speed_and_slope(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> tuple[float, float]:
@@ -26,7 +26,7 @@ def speed_and_slope(
     return base * factor, slope * factor + base * swing
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def turned(  # noqa: PLR0913, PLR0917 -- the law of speed has five numbers
     time: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
@@ -54,7 +54,7 @@ def turned(  # noqa: PLR0913, PLR0917 -- the law of speed has five numbers
     return even + amplitude * swing
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy')
 def time_to_turn(  # noqa: PLR0913, PLR0917 -- the law of speed has five numbers
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:

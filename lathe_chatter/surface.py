@@ -50,7 +50,7 @@ def fresh_surface(slope: float, capacity: int) -> Array:
     return nodes
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy', inline='always')
 def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
     """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
     width = nodes[left + 1, ANGLE] - nodes[left, ANGLE]
@@ -71,15 +71,24 @@ def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, flo
     return height, slope / width, curvature / (width * width)
 
 
-@njit(cache=True)
 def grown(nodes: Array) -> Array:
     """The same nodes with room for twice as many."""
-    larger = np.zeros((2 * nodes.shape[0], NODE_SIZE))
-    larger[: nodes.shape[0]] = nodes
-    return larger
+    return np.concatenate([nodes, np.zeros_like(nodes)])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model='numpy', inline='always')
+def node_at(  # noqa: PLR0913, PLR0917 -- plain numbers
+    nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float
+) -> None:
+    """Write a smooth node; a corner's other side is written by `bend`."""
+    nodes[node, ANGLE] = angle
+    nodes[node, HEIGHT] = height
+    nodes[node, SLOPE_BEFORE] = nodes[node, SLOPE_AFTER] = slope
+    nodes[node, CURVATURE_BEFORE] = nodes[node, CURVATURE_AFTER] = curvature
+    nodes[node, ORDER] = SMOOTH
+
+
+@njit(cache=True, error_model='numpy')
 def next_turn(nodes: Array, first: int, last: int, advance: float) -> None:
     """Forget what lies before node `first`, and count angle and feed from the new turn on.
 
