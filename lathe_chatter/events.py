@@ -34,7 +34,7 @@ def _root(series: Array, terms: int, sign: float, low: float, high: float) -> fl
 
 
 @njit(cache=True, error_model='numpy')
-def _turning_point(series: Array, terms: int, rising_first: bool) -> float:  # noqa: FBT001
+def _turning_point(series: Array, terms: int, rising_first: bool) -> float:
     """Where the slope changes sign between 0 and 1, by bisection: it happens twice a period."""
     low, high = 0.0, 1.0
     for _ in range(_ITERATIONS):
@@ -82,7 +82,7 @@ def first_crossing(series: Array, terms: int, sign: float) -> float:
     return NEVER
 
 
-@njit(cache=True, error_model='numpy', inline='always')
+@njit(cache=True, error_model='numpy', forceinline=True)
 def may_turn_back(
     start: float, slope: float, end: float, slope_end: float, duration: float
 ) -> bool:

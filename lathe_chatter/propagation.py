@@ -40,17 +40,15 @@ RATE_STEP = 0.12
 ) = range(9)
 MECHANICS_SIZE = 9
 
-# The inputs of a whole step: the state at its start, the surface at both ends, what is constant.
-INPUTS = 12
+ROWS = 13
+"""Of the matrix of a regime, see `step_matrices`."""
 OUT_OF_CUT, IN_CUT, ENGAGED = 0, 1, 2
 REGIMES = 4
 """A regime is the sum of IN_CUT and ENGAGED where they hold."""
 
 
 @njit(cache=True, error_model='numpy')
-def quintic(  # noqa: PLR0913, PLR0917 -- value and two derivatives at both ends
-    u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array
-) -> None:
+def quintic(u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array) -> None:
     """Coefficients (6,) of the quintic on [0, 1] with these values, slopes and curvatures."""
     rise = u1 - u0 - d0 - 0.5 * e0
     steep = d1 - d0 - e0
@@ -64,7 +62,7 @@ def quintic(  # noqa: PLR0913, PLR0917 -- value and two derivatives at both ends
 
 
 @njit(cache=True, error_model='numpy')
-def solve_piece(  # noqa: PLR0913, PLR0917 -- the inner loop takes plain numbers
+def solve_piece(
     state: Array,
     duration: float,
     regime: int,
@@ -143,56 +141,92 @@ def end_state(tool: Array, workpiece: Array, duration: float, state: Array) -> N
     state[3] = slope_at(workpiece, TERMS, 1.0) / duration
 
 
-@njit(cache=True, error_model='numpy', inline='always')
-def whole_step(  # noqa: PLR0913, PLR0917 -- plain arrays
-    state: Array, ends: Array, matrices: Array, regime: int, force: float, end: Array
-) -> None:
-    """Write the state (4,) after a whole step, by `step_matrices`.
+@njit(cache=True, error_model='numpy', forceinline=True)
+def whole_step(
+    matrices: Array, regime: int, x0: float, x1: float, x2: float, x3: float,
+    u0: float, u1: float, u2: float, u3: float, u4: float, u5: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """The state after a whole step by `step_matrices`.
 
-    `ends` holds the surface with its first two derivatives by time at both ends (6,).
+    Args:
+        matrices: As made by `step_matrices`.
+        regime: Sum of IN_CUT and ENGAGED.
+        x0: Tool displacement at the start; x1 its velocity, x2 and x3 those of the workpiece.
+        u0: The surface at the start; u1 and u2 its derivatives by time, u3 to u5 at the end.
+
+    Returns:
+        The state at the end, in the same order.
     """
-    x0, x1, x2, x3 = state[0], state[1], state[2], state[3]
-    u0, u1, u2, u3, u4, u5 = ends[0], ends[1], ends[2], ends[3], ends[4], ends[5]
-    for k in range(4):
-        end[k] = (
-            (matrices[regime, 0, k] * x0 + matrices[regime, 1, k] * x1)
-            + (matrices[regime, 2, k] * x2 + matrices[regime, 3, k] * x3)
-        ) + (
-            (matrices[regime, 4, k] * u0 + matrices[regime, 5, k] * u1)
-            + (matrices[regime, 6, k] * u2 + matrices[regime, 7, k] * u3)
-            + (matrices[regime, 8, k] * u4 + matrices[regime, 9, k] * u5)
-            + (matrices[regime, 10, k] * force + matrices[regime, 11, k])
-        )
+    m = matrices[regime]
+    return (
+        (m[0, 0] * x0 + m[1, 0] * x1) + (m[2, 0] * x2 + m[3, 0] * x3)
+        + ((m[4, 0] * u0 + m[5, 0] * u1) + (m[6, 0] * u2 + m[7, 0] * u3))
+        + ((m[8, 0] * u4 + m[9, 0] * u5) + m[10, 0]),
+        (m[0, 1] * x0 + m[1, 1] * x1) + (m[2, 1] * x2 + m[3, 1] * x3)
+        + ((m[4, 1] * u0 + m[5, 1] * u1) + (m[6, 1] * u2 + m[7, 1] * u3))
+        + ((m[8, 1] * u4 + m[9, 1] * u5) + m[10, 1]),
+        (m[0, 2] * x0 + m[1, 2] * x1) + (m[2, 2] * x2 + m[3, 2] * x3)
+        + ((m[4, 2] * u0 + m[5, 2] * u1) + (m[6, 2] * u2 + m[7, 2] * u3))
+        + ((m[8, 2] * u4 + m[9, 2] * u5) + m[10, 2]),
+        (m[0, 3] * x0 + m[1, 3] * x1) + (m[2, 3] * x2 + m[3, 3] * x3)
+        + ((m[4, 3] * u0 + m[5, 3] * u1) + (m[6, 3] * u2 + m[7, 3] * u3))
+        + ((m[8, 3] * u4 + m[9, 3] * u5) + m[10, 3]),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model='numpy', forceinline=True)
+def relative_acceleration(
+    matrices: Array, regime: int, x0: float, x1: float, x2: float, x3: float, met: float,
+    force: float,
+) -> float:  # fmt: skip
+    """r'' = x_t'' - x_wp'' of a state that meets the surface at `met`, m/s2."""
+    m = matrices[regime]
+    result: float = (
+        ((m[11, 0] * x0 + m[11, 1] * x1) + (m[11, 2] * x2 + m[11, 3] * x3))
+        + (m[12, 0] * met + m[12, 1] * force)
+        + m[12, 2]
+    )
+    return result
 
 
 @njit(cache=True, error_model='numpy')
 def step_matrices(step: float, mechanics: Array) -> Array:
-    """The exact response (REGIMES, INPUTS, 4) of the state after a whole step to each input.
+    """The exact response to a whole step in each regime (REGIMES, ROWS, 4).
 
-    Inputs: the state (4), then U, U' and U'' at the start and U, U' and U'' at the end of the
-    step (6, in SI), a constant force of 1 N on the tool, and the number 1 (the bearing's
-    clearance). The columns are sums of the same series as a piece: no second method.
+    Rows 0-9 are what one unit of an input adds to the state (4) at the end: the state (4) at
+    the start, U, U' and U'' at the start and then at the end of the step; row 10 is what the
+    bearing's clearance adds. They are sums of the same series as a piece: no second method.
+    Rows 11 and 12 are the relative acceleration per unit of the state (4), then of U, of a
+    force on the tool, and its constant part.
     """
-    result = np.zeros((REGIMES, INPUTS, 4))
+    result = np.zeros((REGIMES, ROWS, 4))
     tool, workpiece = np.zeros(TERMS), np.zeros(TERMS)
     surface, state, ends = np.zeros(6), np.zeros(4), np.zeros(6)
     bare = mechanics.copy()
     bare[CLEARANCE] = 0.0
     for regime in range(REGIMES):
-        for source in range(INPUTS):
+        for source in range(11):
             state[:] = 0.0
             ends[:] = 0.0
-            force = 0.0
             if source < 4:
                 state[source] = 1.0
             elif source < 10:
                 order = (source - 4) % 3
                 ends[source - 4] = 1.0 if order == 0 else step if order == 1 else step * step
-            elif source == 10:
-                force = 1.0
             quintic(ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], surface)
-            constants = mechanics if source == 11 else bare
-            solve_piece(state, step, regime, constants, force, surface, tool, workpiece)
+            constants = mechanics if source == 10 else bare
+            solve_piece(state, step, regime, constants, 0.0, surface, tool, workpiece)
             end_state(tool, workpiece, step, state)
             result[regime, source] = state
+        cutting = 0.0
+        if regime & IN_CUT != 0:
+            cutting = mechanics[TOOL_CUTTING] + mechanics[WORKPIECE_CUTTING]
+        bearing = mechanics[BEARING_STIFFNESS] if regime & ENGAGED != 0 else 0.0
+        result[regime, 11, 0] = -mechanics[TOOL_STIFFNESS] - cutting
+        result[regime, 11, 1] = -mechanics[TOOL_DAMPING]
+        result[regime, 11, 2] = mechanics[WORKPIECE_STIFFNESS] + bearing + cutting
+        result[regime, 11, 3] = mechanics[WORKPIECE_DAMPING]
+        result[regime, 12, 0] = cutting
+        result[regime, 12, 1] = mechanics[TOOL_COMPLIANCE]
+        result[regime, 12, 2] = -bearing * mechanics[CLEARANCE]
     return result

@@ -27,7 +27,7 @@ def speed_and_slope(
 
 
 @njit(cache=True, error_model='numpy')
-def turned(  # noqa: PLR0913, PLR0917 -- the law of speed has five numbers
+def turned(
     time: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
     """Revolutions made in `time`.
@@ -55,7 +55,7 @@ def turned(  # noqa: PLR0913, PLR0917 -- the law of speed has five numbers
 
 
 @njit(cache=True, error_model='numpy')
-def time_to_turn(  # noqa: PLR0913, PLR0917 -- the law of speed has five numbers
+def time_to_turn(
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
     """Time in which the spindle turns `angle` (rev), by Newton: `turned` is increasing."""

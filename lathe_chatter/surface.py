@@ -50,7 +50,7 @@ def fresh_surface(slope: float, capacity: int) -> Array:
     return nodes
 
 
-@njit(cache=True, error_model='numpy', inline='always')
+@njit(cache=True, error_model='numpy', forceinline=True)
 def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
     """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
     width = nodes[left + 1, ANGLE] - nodes[left, ANGLE]
@@ -76,16 +76,18 @@ def grown(nodes: Array) -> Array:
     return np.concatenate([nodes, np.zeros_like(nodes)])
 
 
-@njit(cache=True, error_model='numpy', inline='always')
-def node_at(  # noqa: PLR0913, PLR0917 -- plain numbers
-    nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float
-) -> None:
-    """Write a smooth node; a corner's other side is written by `bend`."""
+@njit(cache=True, error_model='numpy', forceinline=True)
+def write_node(
+    nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float,
+    pitch: float,
+) -> None:  # fmt: skip
+    """Write a node that is smooth until it turns out to be a corner."""
     nodes[node, ANGLE] = angle
     nodes[node, HEIGHT] = height
     nodes[node, SLOPE_BEFORE] = nodes[node, SLOPE_AFTER] = slope
     nodes[node, CURVATURE_BEFORE] = nodes[node, CURVATURE_AFTER] = curvature
     nodes[node, ORDER] = SMOOTH
+    nodes[node, PITCH] = pitch
 
 
 @njit(cache=True, error_model='numpy')

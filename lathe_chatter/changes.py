@@ -1,0 +1,87 @@
+"""A change of the cut as a sentence that people read and programs read back.
+
+The lathe logs one when a change takes effect, with its simulated time; so every recorder of
+/rosout has it, and the reader of a run takes the change from there:
+
+    At 3.000000 s: depth_of_cut 0.0005 -> 0.00062 m, spindle_speed_rpm 3000.0 -> 7800.0 rev/min.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Any
+
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.model import Cut
+from lathe_chatter.quantities import quantity_of
+
+_SENTENCE = re.compile(r'^At (?P<time>[0-9.]+) s: (?P<changes>.+ -> .+)\.$')
+_CHANGE = re.compile(r'^(?P<name>\w+) (?P<old>\S+) -> (?P<new>\S+)(?: \S+)?$')
+
+
+@dataclass(frozen=True)
+class Change:
+    """What of a cut changed when.
+
+    Attributes:
+        time: Simulated time from which the new values hold, s.
+        old: The former values by name of field.
+        new: The new ones.
+    """
+
+    time: float
+    old: dict[str, Any]
+    new: dict[str, Any]
+
+
+def change_sentence(time: float, old: Cut, new: Cut) -> str:
+    """The sentence for a change of the cut at a simulated time, empty where nothing differs."""
+    changes = ', '.join(_differences(old, new))
+    return changes and f'At {time:.6f} s: {changes}.'
+
+
+def parse_change(sentence: str) -> Change | None:
+    """The change that a sentence of `change_sentence` tells, or None if it tells none."""
+    match = _SENTENCE.match(sentence)
+    if match is None:
+        return None
+    old: dict[str, Any] = {}
+    new: dict[str, Any] = {}
+    for part in match['changes'].split(', '):
+        change = _CHANGE.match(part)
+        if change is None or change['name'] not in Cut.__dataclass_fields__:
+            return None
+        try:
+            before = Cut().with_changes(**{change['name']: _value(change['old'])})
+            after = Cut().with_changes(**{change['name']: _value(change['new'])})
+        except ParameterError:
+            return None
+        old[change['name']] = getattr(before, change['name'])
+        new[change['name']] = getattr(after, change['name'])
+    return Change(float(match['time']), old, new)
+
+
+def _differences(old: Cut, new: Cut) -> Iterator[str]:
+    """Each field that differs, with its unit; repr keeps every bit of a number."""
+    for entry in fields(Cut):
+        before, after = getattr(old, entry.name), getattr(new, entry.name)
+        if before != after:
+            limits = quantity_of(entry)
+            unit = f' {limits.unit}' if limits is not None and limits.unit else ''
+            yield f'{entry.name} {_shown(before)} -> {_shown(after)}{unit}'
+
+
+def _shown(value: Any) -> str:
+    """A number with every bit, a choice by its value."""
+    return str(value.value) if isinstance(value, Enum) else repr(value)
+
+
+def _value(text: str) -> Any:
+    """A number where it is one."""
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,64 @@
+"""`lathe-chatter`: one verb a module of `lathe_chatter.commands`."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType
+
+from lathe_chatter import __version__
+from lathe_chatter.commands import VERBS
+from lathe_chatter.errors import LatheChatterError
+
+USER_ERROR = 2
+INTERRUPTED = 130
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line with every verb."""
+    result = argparse.ArgumentParser(
+        prog='lathe-chatter',
+        description='A virtual lathe with bearing clearance: run it, record it, look into it.',
+    )
+    result.add_argument('--version', action='version', version=f'lathe-chatter {__version__}')
+    verbs = result.add_subparsers(dest='verb', metavar='VERB', required=True)
+    for verb in VERBS:
+        entry = verbs.add_parser(
+            verb.NAME,
+            help=verb.HELP,
+            description=verb.HELP,
+            epilog=f'example: {verb.EXAMPLE}',
+        )
+        verb.configure(entry)
+        entry.set_defaults(run=verb.run)
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Carry out a command line.
+
+    Returns:
+        The exit code: 0, what the verb says (1 for a verdict that is no), 2 for a user's
+        mistake, 130 when interrupted.
+    """
+    signal.signal(signal.SIGTERM, _interrupt)
+    options = parser().parse_args(arguments)
+    try:
+        code: int = options.run(options)
+    except LatheChatterError as error:
+        sys.stderr.write(f'lathe-chatter {options.verb}: {error}\n')
+        return USER_ERROR
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return code
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    """End on SIGTERM as on Ctrl-C: what was begun is finished."""
+    raise KeyboardInterrupt
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,130 @@
+"""`lathe-chatter report`: what happened in a recorded run, as a table and a picture."""
+
+from __future__ import annotations
+
+import json
+import math
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from lathe_chatter.history import History, read_history
+from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.pictures import draw_run
+from lathe_chatter.stability import rightmost_root
+
+NAME = 'report'
+HELP = 'print what happened in a recorded run and draw it'
+EXAMPLE = 'lathe-chatter report runs/20260401-120000'
+
+PICTURE = 'report.png'
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument('run_path', type=Path, metavar='RUN', help='folder of a recorded run')
+    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+
+
+def run(options: Namespace) -> int:
+    """Report on a run."""
+    figures = show_run(
+        read_history(options.run_path), Console(stderr=options.json, highlight=False)
+    )
+    if options.json:
+        Console(highlight=False, soft_wrap=True).print(json.dumps(figures))
+    return 0
+
+
+def show_run(history: History, console: Console) -> dict[str, Any]:
+    """Print the table of a run, draw its picture beside it, and return the same as figures."""
+    occurrences = _occurrences(history)
+    table = Table(title=None, header_style='bold', pad_edge=False)
+    table.add_column('time / s', justify='right')
+    table.add_column('what')
+    table.add_column('monitor', justify='right')
+    table.add_column('open machine', justify='right')
+    table.add_column('seated on its bearing', justify='right')
+    for entry in occurrences:
+        table.add_row(
+            f'{entry["time"]:.3f}',
+            entry['what'],
+            _pair(entry['frequency'], entry['growth_rate']),
+            *(_pair(root['frequency'], root['growth_rate']) for root in entry['roots'].values()),
+        )
+    console.print(table)
+    console.print(
+        'Each pair is chatter frequency / Hz and growth rate / 1/s: what the monitor measured, '
+        'and the rightmost\ncharacteristic root of the linear machine, open and seated.'
+    )
+    picture = history.path / PICTURE
+    draw_run(history, picture)
+    console.print(f'run      {history.path}\npicture  {picture}', soft_wrap=True)
+    return {'run': str(history.path), 'picture': str(picture), 'occurrences': occurrences}
+
+
+def _pair(frequency: float | None, growth_rate: float | None) -> str:
+    """Frequency and growth rate, blank where unknown."""
+    if frequency is None or growth_rate is None:
+        return ''
+    return f'{frequency:.1f}  {growth_rate:+7.2f}'
+
+
+def _occurrences(history: History) -> list[dict[str, Any]]:
+    """Start, changes, flags and end, in order of time."""
+    start = history.start
+    result = [_entry(history, 0.0, f'start: {_cut_text(start)}')]
+    for change in history.changes:
+        words = ', '.join(f'{name} {_number(value)}' for name, value in change.new.items())
+        result.append(_entry(history, change.time, words))
+    for flag in history.flags:
+        entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
+        if flag.chatter:
+            entry['frequency'] = _known(flag.frequency)
+            entry['growth_rate'] = _known(flag.growth_rate)
+        result.append(entry)
+    result.sort(key=lambda entry: float(entry['time']))
+    result.append(_entry(history, history.duration, 'end'))
+    return result
+
+
+def _entry(history: History, time: float, what: str) -> dict[str, Any]:
+    """One occurrence with the characteristic roots of the cut in force then."""
+    cut = history.cut_at(time)
+    roots: dict[str, dict[str, float | None]] = {}
+    for regime, seated in (('open', False), ('seated', True)):
+        # A machine without clearance in its model has no bearing to rest on.
+        if seated and cut.bearing_contact is BearingContact.NONE:
+            roots[regime] = {'frequency': None, 'growth_rate': None}
+            continue
+        root = rightmost_root(
+            history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
+        )
+        roots[regime] = {
+            'frequency': root.imag / (2.0 * math.pi),
+            'growth_rate': root.real,
+        }
+    return {'time': time, 'what': what, 'frequency': None, 'growth_rate': None, 'roots': roots}
+
+
+def _cut_text(cut: Cut) -> str:
+    """Speed, depth and bearing in the units of the shop floor."""
+    bearing = (
+        'no clearance'
+        if cut.bearing_contact is BearingContact.NONE
+        else f'clearance {cut.bearing_clearance * 1e6:g} µm ({cut.bearing_contact.value})'
+    )
+    return f'{cut.spindle_speed_rpm:g} rev/min, {cut.depth_of_cut * 1e3:g} mm, {bearing}'
+
+
+def _number(value: object) -> str:
+    """A value as a person writes it."""
+    return f'{value:g}' if isinstance(value, float) else str(getattr(value, 'value', value))
+
+
+def _known(value: float) -> float | None:
+    """None for nan, as JSON has no nan."""
+    return value if math.isfinite(value) else None

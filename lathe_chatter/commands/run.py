@@ -1,0 +1,198 @@
+"""`lathe-chatter run`: the main job. A cell of real nodes plays a scenario and is recorded."""
+
+from __future__ import annotations
+
+import json
+import time
+from argparse import ArgumentParser, Namespace
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from lathe_chatter.cell import Cell
+from lathe_chatter.commands.report import show_run
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.history import History, read_history
+from lathe_chatter.scenario import (
+    CLEARED,
+    FLAGGED,
+    Scenario,
+    find_scenario,
+    load_scenario,
+    shipped_scenarios,
+)
+from lathe_chatter.warm_up import warm_up
+
+if TYPE_CHECKING:
+    from lathe_chatter.nodes.operator_node import Operator
+
+NAME = 'run'
+HELP = 'start lathe, monitor and recorder, play a scenario, and leave the recorded run'
+EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
+
+_START_PATIENCE = 30.0
+"""s for the nodes to find each other."""
+_GRACE = 10.0
+"""s of simulated time beyond a scenario's end for what the monitor is expected to say."""
+
+
+class RunFailedError(LatheChatterError):
+    """The run could not be made; the text says why."""
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        '--scenario',
+        default='clearance',
+        metavar='FILE',
+        help=f'a YAML file, or one of {", ".join(shipped_scenarios())} (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--output', type=Path, metavar='DIR', help='folder to make (default: runs/<date-time>)'
+    )
+    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+
+
+def run(options: Namespace) -> int:
+    """Play the scenario; 0 if the monitor said what the scenario expects, else 1."""
+    scenario = load_scenario(find_scenario(options.scenario))
+    output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
+    if output.exists():
+        raise RunFailedError(f'{output} exists already: give another --output.')
+    console = Console(stderr=options.json, highlight=False)
+    console.print(f'[bold]{scenario.title}[/bold]  (scenario {scenario.name})')
+    with console.status('Compiling the integrator (once on a machine) ...'):
+        warm_up()
+    interrupted = _play(scenario, output, console)
+    history = read_history(output)
+    figures = show_run(history, console)
+    if options.json:
+        Console(highlight=False, soft_wrap=True).print(json.dumps(figures))
+    if interrupted:
+        console.print('Interrupted: the run above is complete up to that moment.')
+        return 130
+    return _verdict(scenario, history, console)
+
+
+def _play(scenario: Scenario, output: Path, console: Console) -> bool:
+    """Start the cell, play, and end the cell; whether it was interrupted."""
+    try:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.signals import SignalHandlerOptions
+
+        from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
+    except ImportError as error:
+        raise RunFailedError(
+            f'ROS 2 is not there ({error}): source an installation, or use `make run`, '
+            'which installs what it needs.'
+        ) from None
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    operator = Operator(scenario, tell=console.print)
+    executor = SingleThreadedExecutor()
+    executor.add_node(operator)
+    interrupted = False
+    try:
+        with Cell() as cell:
+            try:
+                with console.status('Starting the monitor and the recorder ...'):
+                    cell.start(
+                        'run_recorder',
+                        'lathe_chatter.nodes.recorder_node',
+                        parameter_arguments({'output': str(output)}),
+                    )
+                    cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
+                    _await_nodes(operator, executor, cell)
+                cell.start(
+                    'lathe',
+                    'lathe_chatter.nodes.lathe_node',
+                    parameter_arguments(scenario.parameters),
+                )
+                _follow(operator, executor, cell, scenario, console)
+            except KeyboardInterrupt:
+                interrupted = True
+            complaints = cell.end()
+        if complaints:
+            raise RunFailedError(' '.join(complaints))
+    finally:
+        executor.shutdown()
+        operator.destroy_node()
+        rclpy.try_shutdown()
+    return interrupted
+
+
+def _await_nodes(operator: Operator, executor: Any, cell: Cell) -> None:
+    """Wait until the recorder and the monitor are there, so that nothing of the lathe is lost."""
+    until = time.monotonic() + _START_PATIENCE
+    wanted = {'run_recorder', 'chatter_monitor'}
+    while not wanted <= set(operator.get_node_names()):
+        executor.spin_once(timeout_sec=0.1)
+        cell.check()
+        if time.monotonic() > until:
+            missing = ' and '.join(sorted(wanted - set(operator.get_node_names())))
+            raise RunFailedError(f'{missing} did not appear within {_START_PATIENCE:.0f} s.')
+    if 'lathe' in operator.get_node_names():
+        raise RunFailedError(
+            'Another lathe is cutting in this ROS domain already: end it, or set ROS_DOMAIN_ID '
+            'to another number.'
+        )
+
+
+def _follow(
+    operator: Operator, executor: Any, cell: Cell, scenario: Scenario, console: Console
+) -> None:
+    """Spin until the scenario is played, with a bar of simulated time."""
+    columns = (
+        TextColumn('{task.completed:6.2f} of {task.total:.0f} s'),
+        BarColumn(bar_width=None),
+        TextColumn('{task.description}'),
+        TimeElapsedColumn(),
+    )
+    until = time.monotonic() + _START_PATIENCE
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task('waiting for the lathe', total=scenario.duration)
+        while not _finished(operator, scenario):
+            executor.spin_once(timeout_sec=0.1)
+            cell.check()
+            if operator.failure is not None:
+                raise operator.failure
+            if operator.time == 0.0 and time.monotonic() > until:
+                raise RunFailedError(
+                    f'The lathe published no sample within {_START_PATIENCE:.0f} s.'
+                )
+            progress.update(
+                bar,
+                completed=min(operator.time, scenario.duration),
+                description=operator.state if operator.time else 'waiting for the lathe',
+            )
+
+
+def _finished(operator: Operator, scenario: Scenario) -> bool:
+    """Whether the time is over, and the monitor has said what is expected or will not."""
+    if operator.time < scenario.duration:
+        return False
+    pending = not operator.idle or any(
+        expected and word not in operator.said for word, expected in scenario.expect.items()
+    )
+    return not pending or operator.time >= scenario.duration + _GRACE
+
+
+def _verdict(scenario: Scenario, history: History, console: Console) -> int:
+    """Say whether the monitor said what the scenario expects."""
+    said = {
+        FLAGGED: any(flag.chatter for flag in history.flags),
+        CLEARED: bool(history.flags) and not history.flags[-1].chatter,
+    }
+    wrong = [word for word, expected in scenario.expect.items() if said[word] != expected]
+    for word in wrong:
+        expected = 'was' if scenario.expect[word] else 'was not'
+        console.print(f'[bold red]Chatter {expected} to be {word}, and it is otherwise.[/]')
+    if scenario.expect and not wrong:
+        happened = ' and '.join(word for word in (FLAGGED, CLEARED) if scenario.expect.get(word))
+        story = f'chatter was {happened}' if happened else 'nothing was flagged'
+        console.print(f'As the scenario expects, {story}.')
+    return 1 if wrong else 0

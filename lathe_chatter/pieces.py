@@ -1,0 +1,415 @@
+"""One whole step with whatever happens inside it: the general case of the inner loop.
+
+The step is cut where the tool meets a corner in the surface of the turn before, where the
+bearing engages or releases, where the tool leaves or enters the cut, and where a speed ramp
+ends. Each piece between is solved exactly (propagation.py) and leaves a node of the surface.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from lathe_chatter import layout, noise, propagation, surface
+from lathe_chatter.events import NEVER, first_crossing, may_turn_back
+from lathe_chatter.model import Array, Integers
+from lathe_chatter.propagation import (
+    ENGAGED,
+    IN_CUT,
+    TERMS,
+    relative_acceleration,
+    whole_step,
+)
+from lathe_chatter.spindle import speed_and_slope, time_to_turn, turned
+
+FLIPS = 32
+"""Events in one step before it is finished without looking for more: a grazing contact that
+rounding cannot decide is no reason to stand still."""
+DETAIL = 1.5
+"""A piece may meet this many steps' worth of surface, as finely as that was cut."""
+
+
+class Scratch(NamedTuple):
+    """Room to work in, so that no piece has to ask for memory."""
+
+    piece: Array  # (PIECE_SIZE,)
+    end: Array  # state at the end of the piece (4,)
+    tool: Array  # power series of the piece (TERMS,)
+    workpiece: Array  # the same
+    hold: Array  # the quintic of the surface met (6,)
+    margin: Array  # of an event (TERMS,)
+
+
+# The surface at both ends of a piece, by time, and what belongs to its far end.
+(
+    MET_0, RATE_0, BEND_0, MET_1, RATE_1, BEND_1,  # m, m/s, m/s2
+    DURATION, ANGLE_1, ANGLE_LOW_1, FED_1, FED_LOW_1, SPEED_1, SPEED_SLOPE_1,
+    HEIGHT_1, SLOPE_1, CURVATURE_1,  # of the surface met there, by angle
+) = range(16)  # fmt: skip
+PIECE_SIZE = 16
+
+
+@njit(cache=True, error_model='numpy', forceinline=True)
+def add(high: float, low: float, increment: float) -> tuple[float, float]:
+    """Compensated addition: a turn of 10^5 steps sums as exactly as one step."""
+    increment += low
+    total = high + increment
+    return total, increment - (total - high)
+
+
+@njit(cache=True, error_model='numpy', forceinline=True)
+def has_room(capacity: int, head: int, pointer: int, steps: int) -> bool:
+    """Whether the surface can take a sample: the corners of a turn and the events of its steps."""
+    return capacity - head > (FLIPS + 1) * steps + (head - pointer) + 2
+
+
+@njit(cache=True, error_model='numpy', forceinline=True)
+def write_sample(
+    out: Array, row: int, settings: Array, counts: Integers, angle: float, speed: float,
+    regime: int, xt: float, vt: float, xw: float, vw: float, chip: float,
+) -> None:  # fmt: skip
+    """Write a sample and count it. `chip` is the chip thickness, or its part about the mean."""
+    counts[layout.SAMPLES] += 1
+    out[row, 0] = counts[layout.SAMPLES] / settings[layout.SAMPLE_RATE]
+    out[row, 1] = counts[layout.TURNS] + angle
+    out[row, 2], out[row, 3], out[row, 4], out[row, 5] = xt, vt, xw, vw
+    out[row, 6] = chip + settings[layout.NOMINAL_FEED_SPEED] / speed
+    if settings[layout.MAY_LEAVE_CUT] != 0.0:
+        out[row, 6] = max(chip, 0.0)
+    out[row, 7] = settings[layout.CUTTING_STIFFNESS] * chip if regime & IN_CUT != 0 else 0.0
+
+
+@njit(cache=True, error_model='numpy')
+def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: int) -> None:
+    """Add to a sample what sensors see beside the motion: runout and their own noise."""
+    turn = 2.0 * math.pi * (out[row, 1] % 1.0)
+    out[row, 4] += settings[layout.RUNOUT] * math.cos(turn)
+    out[row, 5] -= settings[layout.RUNOUT] * 2.0 * math.pi * speed * math.sin(turn)
+    if settings[layout.SENSOR_NOISE] > 0.0:
+        sample = round(out[row, 0] * settings[layout.SAMPLE_RATE])
+        out[row, 2] += settings[layout.SENSOR_NOISE] * noise.standard_normal(
+            seed, noise.TOOL_SENSOR_STREAM, sample
+        )
+        out[row, 4] += settings[layout.SENSOR_NOISE] * noise.standard_normal(
+            seed, noise.WORKPIECE_SENSOR_STREAM, sample
+        )
+
+
+@njit(cache=True, error_model='numpy')
+def _lower(order: int, other: int) -> int:
+    """The lower of two orders of a corner, where 0 stands for none."""
+    return other if order == 0 else min(order, other)
+
+
+@njit(cache=True, error_model='numpy')
+def _finish_corner(
+    numbers: Array, counts: Integers, nodes: Array, settings: Array, matrices: Array,
+    force: float, speed: float, acceleration: float,
+) -> None:  # fmt: skip
+    """Write what follows the newest node, a corner: it differs from what led to it."""
+    head, regime = counts[layout.HEAD], counts[layout.REGIME]
+    slope, curvature = numbers[layout.MET_SLOPE], numbers[layout.MET_CURVATURE]
+    if regime & IN_CUT != 0:
+        xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
+        xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
+        met = numbers[layout.MET] - numbers[layout.FED]
+        bend = relative_acceleration(matrices, regime, xt, vt, xw, vw, met, force)
+        slope = (settings[layout.FEED_SPEED] + vt - vw) / speed
+        curvature = (bend - slope * acceleration) / (speed * speed)
+    nodes[head, surface.SLOPE_AFTER] = slope
+    nodes[head, surface.CURVATURE_AFTER] = curvature
+    nodes[head, surface.ORDER] = min(nodes[head, surface.ORDER], counts[layout.CORNER])
+    counts[layout.CORNER] = 0
+
+
+@njit(cache=True, error_model='numpy')
+def _plan(
+    numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, limit: float,
+    merge: float, piece: Array,
+) -> tuple[int, bool, bool]:  # fmt: skip
+    """Where a piece of at most `limit` s ends, and what the tool meets there, into `piece`.
+
+    Returns:
+        The node at or before the place met, whether it is just there, whether a ramp ends.
+    """
+    speed, phase = numbers[layout.SPEED], numbers[layout.PHASE]
+    variation = settings[layout.VARIATION]
+    frequency = settings[layout.VARIATION_FREQUENCY]
+    steady = slope == 0.0 and variation == 0.0
+    duration, ramp_ends = limit, False
+    if slope != 0.0:
+        to_target = (settings[layout.TARGET_SPEED] - speed) / slope
+        ramp_ends = to_target <= limit + merge
+        if to_target < limit - merge:
+            duration = to_target
+    rise = speed * duration
+    if not steady:
+        rise = turned(duration, speed, slope, variation, phase, frequency)
+    node, pitch = counts[layout.POINTER], nodes[counts[layout.POINTER], surface.PITCH]
+    if rise > DETAIL * pitch:
+        duration, ramp_ends = duration * (0.8 * DETAIL * pitch / rise), False
+        rise = speed * duration
+        if not steady:
+            rise = turned(duration, speed, slope, variation, phase, frequency)
+    angle, angle_low = numbers[layout.ANGLE], numbers[layout.ANGLE_LOW]
+    piece[ANGLE_1], piece[ANGLE_LOW_1] = add(angle, angle_low, rise)
+    place, near, at_node = piece[ANGLE_1] - 1.0, merge * speed, False
+    while nodes[node + 1, surface.ANGLE] < place - near:
+        node += 1
+        if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
+            rise = nodes[node, surface.ANGLE] + 1.0 - angle - angle_low
+            duration, ramp_ends, at_node = rise / speed, False, True
+            if not steady:
+                duration = time_to_turn(rise, speed, slope, variation, phase, frequency)
+            piece[ANGLE_1], piece[ANGLE_LOW_1] = add(angle, angle_low, rise)
+            break
+    if not at_node and nodes[node + 1, surface.ANGLE] <= place + near:
+        node, at_node = node + 1, True
+
+    if at_node:
+        piece[HEIGHT_1] = nodes[node, surface.HEIGHT]
+        piece[SLOPE_1] = nodes[node, surface.SLOPE_BEFORE]
+        piece[CURVATURE_1] = nodes[node, surface.CURVATURE_BEFORE]
+    else:
+        piece[HEIGHT_1], piece[SLOPE_1], piece[CURVATURE_1] = surface.surface_at(
+            nodes, node, place
+        )
+    piece[DURATION] = duration
+    piece[SPEED_1], piece[SPEED_SLOPE_1] = speed, 0.0
+    if not steady:
+        piece[SPEED_1], piece[SPEED_SLOPE_1] = speed_and_slope(
+            speed + slope * duration, slope, variation, phase + frequency * duration, frequency
+        )
+    feed = settings[layout.FEED_SPEED]
+    piece[FED_1], piece[FED_LOW_1] = add(
+        numbers[layout.FED], numbers[layout.FED_LOW], feed * duration
+    )
+    piece[MET_1] = piece[HEIGHT_1] - piece[FED_1]
+    piece[RATE_1] = piece[SLOPE_1] * piece[SPEED_1] - feed
+    piece[BEND_1] = (
+        piece[CURVATURE_1] * piece[SPEED_1] * piece[SPEED_1]
+        + piece[SLOPE_1] * piece[SPEED_SLOPE_1]
+    )
+    return node, at_node, ramp_ends
+
+
+@njit(cache=True, error_model='numpy')
+def _solve_series(
+    numbers: Array, regime: int, mechanics: Array, force: float, scratch: Scratch
+) -> None:
+    """The power series of the planned piece."""
+    piece = scratch.piece
+    duration = piece[DURATION]
+    square = duration * duration
+    propagation.quintic(
+        piece[MET_0], piece[RATE_0] * duration, piece[BEND_0] * square,
+        piece[MET_1], piece[RATE_1] * duration, piece[BEND_1] * square, scratch.hold,
+    )  # fmt: skip
+    propagation.solve_piece(
+        numbers, duration, regime, mechanics, force, scratch.hold, scratch.tool, scratch.workpiece
+    )
+
+
+@njit(cache=True, error_model='numpy')
+def _solve(
+    numbers: Array, regime: int, mechanics: Array, matrices: Array, force: float, step: float,
+    scratch: Scratch,
+) -> None:  # fmt: skip
+    """The state at the end of the planned piece: by matrix if it is a whole step."""
+    piece, end = scratch.piece, scratch.end
+    if piece[DURATION] == step and force == 0.0:
+        end[0], end[1], end[2], end[3] = whole_step(
+            matrices, regime, numbers[layout.TOOL_X], numbers[layout.TOOL_V],
+            numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V],
+            piece[MET_0], piece[RATE_0], piece[BEND_0],
+            piece[MET_1], piece[RATE_1], piece[BEND_1],
+        )  # fmt: skip
+    else:
+        _solve_series(numbers, regime, mechanics, force, scratch)
+        propagation.end_state(scratch.tool, scratch.workpiece, piece[DURATION], end)
+
+
+@njit(cache=True, error_model='numpy')
+def _find_event(
+    numbers: Array, regime: int, mechanics: Array, settings: Array, force: float, scratch: Scratch
+) -> tuple[float, int]:
+    """The first event in the solved piece and its place in [0, 1], or `NEVER`."""
+    piece, end, margin = scratch.piece, scratch.end, scratch.margin
+    duration, clearance = piece[DURATION], mechanics[propagation.CLEARANCE]
+    watch_bearing = watch_chip = False
+    engaged, cutting = regime & ENGAGED != 0, regime & IN_CUT != 0
+    bearing_side, chip_side = 1.0 if engaged else -1.0, 1.0 if cutting else -1.0
+    if settings[layout.HAS_CLEARANCE] != 0.0:
+        watch_bearing = may_turn_back(
+            bearing_side * (numbers[layout.WORKPIECE_X] - clearance),
+            bearing_side * numbers[layout.WORKPIECE_V],
+            bearing_side * (end[2] - clearance), bearing_side * end[3], duration,
+        )  # fmt: skip
+    if settings[layout.MAY_LEAVE_CUT] != 0.0:
+        relative = numbers[layout.TOOL_X] - numbers[layout.WORKPIECE_X]
+        approach = numbers[layout.TOOL_V] - numbers[layout.WORKPIECE_V]
+        watch_chip = may_turn_back(
+            chip_side * (relative - piece[MET_0]), chip_side * (approach - piece[RATE_0]),
+            chip_side * (end[0] - end[2] - piece[MET_1]),
+            chip_side * (end[1] - end[3] - piece[RATE_1]), duration,
+        )  # fmt: skip
+    if not (watch_bearing or watch_chip):
+        return NEVER, layout.NO_EVENT
+    _solve_series(numbers, regime, mechanics, force, scratch)
+    place, event = NEVER, layout.NO_EVENT
+    if watch_bearing:
+        for k in range(TERMS):
+            margin[k] = scratch.workpiece[k]
+        margin[0] -= clearance
+        place = first_crossing(margin, TERMS, bearing_side)
+        event = layout.BEARING_RELEASES if engaged else layout.BEARING_ENGAGES
+    if watch_chip:
+        for k in range(TERMS):
+            margin[k] = scratch.tool[k] - scratch.workpiece[k]
+        for k in range(6):
+            margin[k] -= scratch.hold[k]
+        chip_place = first_crossing(margin, TERMS, chip_side)
+        if chip_place < place:
+            place = chip_place
+            event = layout.TOOL_LEAVES if cutting else layout.TOOL_ENTERS
+    return (place, event) if place <= 1.0 else (NEVER, layout.NO_EVENT)
+
+
+@njit(cache=True, error_model='numpy')
+def _leave_surface(
+    counts: Integers, nodes: Array, settings: Array, matrices: Array, force: float, step: float,
+    scratch: Scratch,
+) -> None:  # fmt: skip
+    """Add the node at the end of a piece: cut by the tool, or the old surface where it is out."""
+    piece, end, regime = scratch.piece, scratch.end, counts[layout.REGIME]
+    height, slope, curvature = piece[HEIGHT_1], piece[SLOPE_1], piece[CURVATURE_1]
+    speed, pitch = piece[SPEED_1], piece[SPEED_1] * step
+    if regime & IN_CUT != 0:
+        bend = relative_acceleration(
+            matrices, regime, end[0], end[1], end[2], end[3], piece[MET_1], force
+        )
+        height = piece[FED_1] + end[0] - end[2]
+        slope = (settings[layout.FEED_SPEED] + end[1] - end[3]) / speed
+        curvature = (bend - slope * piece[SPEED_SLOPE_1]) / (speed * speed)
+    else:
+        pitch = min(pitch, nodes[counts[layout.POINTER], surface.PITCH])
+    counts[layout.HEAD] += 1
+    surface.write_node(nodes, counts[layout.HEAD], piece[ANGLE_1], height, slope, curvature, pitch)
+
+
+@njit(cache=True, error_model='numpy')
+def _move_on(
+    numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, node: int,
+    at_node: bool, ramp_ends: bool, scratch: Scratch,
+) -> None:  # fmt: skip
+    """Make the end of the piece the present."""
+    piece = scratch.piece
+    numbers[layout.MET] = piece[HEIGHT_1]
+    numbers[layout.MET_SLOPE], numbers[layout.MET_CURVATURE] = piece[SLOPE_1], piece[CURVATURE_1]
+    if at_node and nodes[node, surface.ORDER] <= surface.LAST_ORDER:
+        numbers[layout.MET_SLOPE] = nodes[node, surface.SLOPE_AFTER]
+        numbers[layout.MET_CURVATURE] = nodes[node, surface.CURVATURE_AFTER]
+        # A corner comes back two orders smoother, through a force; or as it was, uncut.
+        order = int(nodes[node, surface.ORDER])
+        order += 2 if counts[layout.REGIME] & IN_CUT != 0 else 0
+        counts[layout.CORNER] = order if order <= surface.LAST_ORDER else 0
+    for k in range(4):
+        numbers[k] = scratch.end[k]
+    numbers[layout.ANGLE], numbers[layout.ANGLE_LOW] = piece[ANGLE_1], piece[ANGLE_LOW_1]
+    numbers[layout.FED], numbers[layout.FED_LOW] = piece[FED_1], piece[FED_LOW_1]
+    numbers[layout.SPEED] += slope * piece[DURATION]
+    if ramp_ends:
+        numbers[layout.SPEED] = settings[layout.TARGET_SPEED]
+        counts[layout.CORNER] = _lower(counts[layout.CORNER], 2)
+    if settings[layout.VARIATION] > 0.0:
+        phase = numbers[layout.PHASE] + settings[layout.VARIATION_FREQUENCY] * piece[DURATION]
+        numbers[layout.PHASE] = phase - math.floor(phase)
+    counts[layout.POINTER] = node
+    counts[layout.PIECES] += 1
+    if numbers[layout.ANGLE] >= 1.0:
+        surface.next_turn(nodes, node, counts[layout.HEAD], numbers[layout.FED])
+        counts[layout.HEAD] -= node
+        counts[layout.POINTER] = 0
+        counts[layout.TURNS] += 1
+        numbers[layout.ANGLE] -= 1.0
+        numbers[layout.MET] -= numbers[layout.FED]
+        numbers[layout.FED] = 0.0
+
+
+@njit(cache=True, error_model='numpy')
+def take_step(
+    numbers: Array, counts: Integers, nodes: Array, settings: Array, mechanics: Array,
+    matrices: Array, force: float, index: int, events: Array, found: int, scratch: Scratch,
+) -> int:  # fmt: skip
+    """Take step `index` of a sample; arrays as in `stepper.advance`.
+
+    Args:
+        force: On the tool, held over the step, N.
+        index: Of the step in its sample.
+        found: Events written so far.
+
+    Returns:
+        Events written so far.
+    """
+    piece = scratch.piece
+    step = 1.0 / (settings[layout.SAMPLE_RATE] * counts[layout.STEPS])
+    merge = surface.MERGE * step
+    left, flips = step, 0
+    while left > 0.0:
+        slope = 0.0
+        if numbers[layout.SPEED] != settings[layout.TARGET_SPEED]:
+            slope = math.copysign(
+                settings[layout.ACCELERATION],
+                settings[layout.TARGET_SPEED] - numbers[layout.SPEED],
+            )
+        speed, acceleration = numbers[layout.SPEED], 0.0
+        if slope != 0.0 or settings[layout.VARIATION] != 0.0:
+            speed, acceleration = speed_and_slope(
+                numbers[layout.SPEED], slope, settings[layout.VARIATION],
+                numbers[layout.PHASE], settings[layout.VARIATION_FREQUENCY],
+            )  # fmt: skip
+        if counts[layout.CORNER] > 0:
+            _finish_corner(numbers, counts, nodes, settings, matrices, force, speed, acceleration)
+        piece[MET_0] = numbers[layout.MET] - numbers[layout.FED]
+        piece[RATE_0] = numbers[layout.MET_SLOPE] * speed - settings[layout.FEED_SPEED]
+        piece[BEND_0] = (
+            numbers[layout.MET_CURVATURE] * speed * speed
+            + numbers[layout.MET_SLOPE] * acceleration
+        )
+        regime = counts[layout.REGIME]
+        node, at_node, ramp_ends = _plan(
+            numbers, counts, nodes, settings, slope, left, merge, piece
+        )
+        _solve(numbers, regime, mechanics, matrices, force, step, scratch)
+        event = layout.NO_EVENT
+        if flips < FLIPS:
+            place, event = _find_event(numbers, regime, mechanics, settings, force, scratch)
+        if event != layout.NO_EVENT:
+            until = place * piece[DURATION]
+            if merge < until < piece[DURATION] - merge:
+                # Inside: the piece ends here, and is solved again as short as it is.
+                node, at_node, ramp_ends = _plan(
+                    numbers, counts, nodes, settings, slope, until, merge, piece
+                )
+                _solve(numbers, regime, mechanics, matrices, force, step, scratch)
+            elif until <= merge:
+                piece[DURATION] = 0.0
+            events[found, 0] = counts[layout.SAMPLES]
+            events[found, 1] = (index + 1) * step - left + piece[DURATION]
+            events[found, 2] = event
+            found += 1
+            flips += 1
+        if piece[DURATION] > 0.0:
+            _leave_surface(counts, nodes, settings, matrices, force, step, scratch)
+            _move_on(numbers, counts, nodes, settings, slope, node, at_node, ramp_ends, scratch)
+            left -= piece[DURATION]
+            if left <= 0.5 * merge:
+                left = 0.0
+        if event != layout.NO_EVENT:
+            # Contact leaves a kink in a third derivative, the end of a cut one in the surface.
+            of_bearing = event <= layout.BEARING_RELEASES
+            counts[layout.REGIME] ^= ENGAGED if of_bearing else IN_CUT
+            counts[layout.CORNER] = _lower(counts[layout.CORNER], 3 if of_bearing else 1)
+    return found

@@ -1,0 +1,142 @@
+"""Whole steps in which nothing happens, as fast as they can be taken.
+
+Nearly every step of a run is one: steady speed, no corner in the surface that the tool meets,
+no change of contact or cutting. This loop takes such steps with everything in registers and
+stops before the first that is not, which pieces.py then takes.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from lathe_chatter import layout, surface
+from lathe_chatter.events import may_turn_back
+from lathe_chatter.model import Array, Integers
+from lathe_chatter.pieces import DETAIL, add, has_room, write_sample
+from lathe_chatter.propagation import (
+    CLEARANCE,
+    ENGAGED,
+    IN_CUT,
+    relative_acceleration,
+    whole_step,
+)
+
+
+@njit(cache=True, error_model='numpy')
+def take_quiet_steps(
+    numbers: Array,
+    counts: Integers,
+    nodes: Array,
+    settings: Array,
+    mechanics: Array,
+    matrices: Array,
+    out: Array,
+    row: int,
+    index: int,
+) -> tuple[int, int]:
+    """Take quiet steps from step `index` of sample `row` on; arrays as in `stepper.advance`.
+
+    Returns:
+        The sample and the step in it that are next.
+    """
+    speed, feed_speed = numbers[layout.SPEED], settings[layout.FEED_SPEED]
+    unsteady = speed != settings[layout.TARGET_SPEED] or settings[layout.VARIATION] != 0.0
+    if unsteady or counts[layout.CORNER] != 0 or settings[layout.FORCE_NOISE] != 0.0:
+        return row, index
+    steps = counts[layout.STEPS]
+    step = 1.0 / (settings[layout.SAMPLE_RATE] * steps)
+    rise, near = speed * step, surface.MERGE * step * speed
+    per_speed, square = 1.0 / speed, speed * speed
+    per_square, feed = 1.0 / square, feed_speed * step
+    limit = settings[layout.LIMIT]
+    may_leave = settings[layout.MAY_LEAVE_CUT] != 0.0
+    has_clearance = settings[layout.HAS_CLEARANCE] != 0.0
+    clearance = mechanics[CLEARANCE]
+    regime = counts[layout.REGIME]
+    in_cut = regime & IN_CUT != 0
+    bearing_side = 1.0 if regime & ENGAGED != 0 else -1.0
+    chip_side = 1.0 if in_cut else -1.0
+
+    xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
+    xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
+    angle, angle_low = numbers[layout.ANGLE], numbers[layout.ANGLE_LOW]
+    fed, fed_low = numbers[layout.FED], numbers[layout.FED_LOW]
+    met, met_slope = numbers[layout.MET], numbers[layout.MET_SLOPE]
+    met_curvature = numbers[layout.MET_CURVATURE]
+    pointer, head = counts[layout.POINTER], counts[layout.HEAD]
+    taken = 0
+    u0, du0, ddu0 = met - fed, met_slope * speed - feed_speed, met_curvature * square
+
+    while row < out.shape[0] and has_room(nodes.shape[0], head, pointer, steps):
+        new_angle, new_angle_low = add(angle, angle_low, rise)
+        if new_angle >= 1.0 or rise > DETAIL * nodes[pointer, surface.PITCH]:
+            break
+        place = new_angle - 1.0
+        node = pointer
+        if nodes[node + 1, surface.ANGLE] < place - near:
+            node += 1
+            if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
+                break
+        following = nodes[node + 1, surface.ANGLE]
+        if following > place + near:
+            next_met, next_slope, next_curvature = surface.surface_at(nodes, node, place)
+        else:
+            node += 1
+            if nodes[node, surface.ORDER] <= surface.LAST_ORDER or following < place - near:
+                break
+            next_met = nodes[node, surface.HEIGHT]
+            next_slope = nodes[node, surface.SLOPE_BEFORE]
+            next_curvature = nodes[node, surface.CURVATURE_BEFORE]
+        new_fed, new_fed_low = add(fed, fed_low, feed)
+        u1 = next_met - new_fed
+        du1, ddu1 = next_slope * speed - feed_speed, next_curvature * square
+        xt1, vt1, xw1, vw1 = whole_step(
+            matrices, regime, xt, vt, xw, vw, u0, du0, ddu0, u1, du1, ddu1
+        )
+        chip = xt1 - xw1 - u1
+        if has_clearance and may_turn_back(
+            bearing_side * (xw - clearance), bearing_side * vw,
+            bearing_side * (xw1 - clearance), bearing_side * vw1, step,
+        ):  # fmt: skip
+            break
+        if may_leave and may_turn_back(
+            chip_side * (xt - xw - u0), chip_side * (vt - vw - du0),
+            chip_side * chip, chip_side * (vt1 - vw1 - du1), step,
+        ):  # fmt: skip
+            break
+        if not (abs(xt1) <= limit and abs(xw1) <= limit):
+            break
+
+        head += 1
+        if in_cut:
+            bend = relative_acceleration(matrices, regime, xt1, vt1, xw1, vw1, u1, 0.0)
+            surface.write_node(
+                nodes, head, new_angle, new_fed + xt1 - xw1,
+                (feed_speed + vt1 - vw1) * per_speed, bend * per_square, rise,
+            )  # fmt: skip
+        else:
+            surface.write_node(
+                nodes, head, new_angle, next_met, next_slope, next_curvature,
+                min(rise, nodes[pointer, surface.PITCH]),
+            )  # fmt: skip
+        xt, vt, xw, vw = xt1, vt1, xw1, vw1
+        u0, du0, ddu0 = u1, du1, ddu1
+        angle, angle_low, fed, fed_low = new_angle, new_angle_low, new_fed, new_fed_low
+        met, met_slope, met_curvature = next_met, next_slope, next_curvature
+        pointer = node
+        taken += 1
+        index += 1
+        if index == steps:
+            index = 0
+            write_sample(out, row, settings, counts, angle, speed, regime, xt, vt, xw, vw, chip)
+            row += 1
+
+    numbers[layout.TOOL_X], numbers[layout.TOOL_V] = xt, vt
+    numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V] = xw, vw
+    numbers[layout.ANGLE], numbers[layout.ANGLE_LOW] = angle, angle_low
+    numbers[layout.FED], numbers[layout.FED_LOW] = fed, fed_low
+    numbers[layout.MET], numbers[layout.MET_SLOPE] = met, met_slope
+    numbers[layout.MET_CURVATURE] = met_curvature
+    counts[layout.POINTER], counts[layout.HEAD] = pointer, head
+    counts[layout.PIECES] += taken
+    return row, index

@@ -1,0 +1,1 @@
+"""References that the solver is measured against, written without its stepper."""
