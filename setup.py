@@ -19,6 +19,7 @@ setup(
         'scipy',  # eigenvalues and special functions of the stability analysis
         'numba',  # the inner loop, compiled without a compiler on the machine
         'matplotlib',  # the pictures of a run
+        'rich',  # tables and progress bars of the command line
         'pyyaml',  # scenario files and metadata.yaml
         'rosbags',  # reads the runs of any rosbag2 writer, and knows the message types
         'mcap',  # writes and reads MCAP
