@@ -67,18 +67,13 @@ def has_room(capacity: int, head: int, pointer: int, steps: int) -> bool:
 
 @njit(cache=True, error_model='numpy', forceinline=True)
 def write_sample(
-    out: Array, row: int, settings: Array, counts: Integers, angle: float, speed: float,
-    regime: int, xt: float, vt: float, xw: float, vw: float, chip: float,
+    out: Array, row: int, time: float, angle: float, xt: float, vt: float, xw: float, vw: float,
+    chip: float, force: float,
 ) -> None:  # fmt: skip
-    """Write a sample and count it. `chip` is the chip thickness, or its part about the mean."""
-    counts[layout.SAMPLES] += 1
-    out[row, 0] = counts[layout.SAMPLES] / settings[layout.SAMPLE_RATE]
-    out[row, 1] = counts[layout.TURNS] + angle
+    """Write a sample, columns as in `model.SAMPLE_COLUMNS`."""
+    out[row, 0], out[row, 1] = time, angle
     out[row, 2], out[row, 3], out[row, 4], out[row, 5] = xt, vt, xw, vw
-    out[row, 6] = chip + settings[layout.NOMINAL_FEED_SPEED] / speed
-    if settings[layout.MAY_LEAVE_CUT] != 0.0:
-        out[row, 6] = max(chip, 0.0)
-    out[row, 7] = settings[layout.CUTTING_STIFFNESS] * chip if regime & IN_CUT != 0 else 0.0
+    out[row, 6], out[row, 7] = chip, force
 
 
 @njit(cache=True, error_model='numpy')
@@ -115,7 +110,8 @@ def _finish_corner(
         xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
         xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
         met = numbers[layout.MET] - numbers[layout.FED]
-        bend = relative_acceleration(matrices, regime, xt, vt, xw, vw, met, force)
+        bend = relative_acceleration(
+            matrices[regime], xt, vt, xw, vw, met, force)
         slope = (settings[layout.FEED_SPEED] + vt - vw) / speed
         curvature = (bend - slope * acceleration) / (speed * speed)
     nodes[head, surface.SLOPE_AFTER] = slope
@@ -221,7 +217,7 @@ def _solve(
     piece, end = scratch.piece, scratch.end
     if piece[DURATION] == step and force == 0.0:
         end[0], end[1], end[2], end[3] = whole_step(
-            matrices, regime, numbers[layout.TOOL_X], numbers[layout.TOOL_V],
+            matrices[regime], numbers[layout.TOOL_X], numbers[layout.TOOL_V],
             numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V],
             piece[MET_0], piece[RATE_0], piece[BEND_0],
             piece[MET_1], piece[RATE_1], piece[BEND_1],
@@ -288,7 +284,7 @@ def _leave_surface(
     speed, pitch = piece[SPEED_1], piece[SPEED_1] * step
     if regime & IN_CUT != 0:
         bend = relative_acceleration(
-            matrices, regime, end[0], end[1], end[2], end[3], piece[MET_1], force
+            matrices[regime], end[0], end[1], end[2], end[3], piece[MET_1], force
         )
         height = piece[FED_1] + end[0] - end[2]
         slope = (settings[layout.FEED_SPEED] + end[1] - end[3]) / speed

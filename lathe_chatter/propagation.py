@@ -143,21 +143,19 @@ def end_state(tool: Array, workpiece: Array, duration: float, state: Array) -> N
 
 @njit(cache=True, error_model='numpy', forceinline=True)
 def whole_step(
-    matrices: Array, regime: int, x0: float, x1: float, x2: float, x3: float,
+    m: Array, x0: float, x1: float, x2: float, x3: float,
     u0: float, u1: float, u2: float, u3: float, u4: float, u5: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """The state after a whole step by `step_matrices`.
+    """The state after a whole step by the matrix of its regime.
 
     Args:
-        matrices: As made by `step_matrices`.
-        regime: Sum of IN_CUT and ENGAGED.
+        m: The matrix of the regime (ROWS, 4).
         x0: Tool displacement at the start; x1 its velocity, x2 and x3 those of the workpiece.
         u0: The surface at the start; u1 and u2 its derivatives by time, u3 to u5 at the end.
 
     Returns:
         The state at the end, in the same order.
     """
-    m = matrices[regime]
     return (
         (m[0, 0] * x0 + m[1, 0] * x1) + (m[2, 0] * x2 + m[3, 0] * x3)
         + ((m[4, 0] * u0 + m[5, 0] * u1) + (m[6, 0] * u2 + m[7, 0] * u3))
@@ -176,11 +174,10 @@ def whole_step(
 
 @njit(cache=True, error_model='numpy', forceinline=True)
 def relative_acceleration(
-    matrices: Array, regime: int, x0: float, x1: float, x2: float, x3: float, met: float,
+    m: Array, x0: float, x1: float, x2: float, x3: float, met: float,
     force: float,
 ) -> float:  # fmt: skip
     """r'' = x_t'' - x_wp'' of a state that meets the surface at `met`, m/s2."""
-    m = matrices[regime]
     result: float = (
         ((m[11, 0] * x0 + m[11, 1] * x1) + (m[11, 2] * x2 + m[11, 3] * x3))
         + (m[12, 0] * met + m[12, 1] * force)

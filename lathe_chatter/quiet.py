@@ -44,16 +44,20 @@ def take_quiet_steps(
     if unsteady or counts[layout.CORNER] != 0 or settings[layout.FORCE_NOISE] != 0.0:
         return row, index
     steps = counts[layout.STEPS]
-    step = 1.0 / (settings[layout.SAMPLE_RATE] * steps)
+    rate = settings[layout.SAMPLE_RATE]
+    step = 1.0 / (rate * steps)
     rise, near = speed * step, surface.MERGE * step * speed
     per_speed, square = 1.0 / speed, speed * speed
+    nominal = settings[layout.NOMINAL_FEED_SPEED] / speed
     per_square, feed = 1.0 / square, feed_speed * step
     limit = settings[layout.LIMIT]
     may_leave = settings[layout.MAY_LEAVE_CUT] != 0.0
     has_clearance = settings[layout.HAS_CLEARANCE] != 0.0
     clearance = mechanics[CLEARANCE]
     regime = counts[layout.REGIME]
+    matrix = matrices[regime]
     in_cut = regime & IN_CUT != 0
+    stiffness = settings[layout.CUTTING_STIFFNESS] if in_cut else 0.0
     bearing_side = 1.0 if regime & ENGAGED != 0 else -1.0
     chip_side = 1.0 if in_cut else -1.0
 
@@ -64,7 +68,7 @@ def take_quiet_steps(
     met, met_slope = numbers[layout.MET], numbers[layout.MET_SLOPE]
     met_curvature = numbers[layout.MET_CURVATURE]
     pointer, head = counts[layout.POINTER], counts[layout.HEAD]
-    taken = 0
+    samples, turns, pieces = counts[layout.SAMPLES], counts[layout.TURNS], counts[layout.PIECES]
     u0, du0, ddu0 = met - fed, met_slope * speed - feed_speed, met_curvature * square
 
     while row < out.shape[0] and has_room(nodes.shape[0], head, pointer, steps):
@@ -91,7 +95,7 @@ def take_quiet_steps(
         u1 = next_met - new_fed
         du1, ddu1 = next_slope * speed - feed_speed, next_curvature * square
         xt1, vt1, xw1, vw1 = whole_step(
-            matrices, regime, xt, vt, xw, vw, u0, du0, ddu0, u1, du1, ddu1
+            matrix, xt, vt, xw, vw, u0, du0, ddu0, u1, du1, ddu1
         )
         chip = xt1 - xw1 - u1
         if has_clearance and may_turn_back(
@@ -109,7 +113,7 @@ def take_quiet_steps(
 
         head += 1
         if in_cut:
-            bend = relative_acceleration(matrices, regime, xt1, vt1, xw1, vw1, u1, 0.0)
+            bend = relative_acceleration(matrix, xt1, vt1, xw1, vw1, u1, 0.0)
             surface.write_node(
                 nodes, head, new_angle, new_fed + xt1 - xw1,
                 (feed_speed + vt1 - vw1) * per_speed, bend * per_square, rise,
@@ -124,11 +128,15 @@ def take_quiet_steps(
         angle, angle_low, fed, fed_low = new_angle, new_angle_low, new_fed, new_fed_low
         met, met_slope, met_curvature = next_met, next_slope, next_curvature
         pointer = node
-        taken += 1
+        pieces += 1
         index += 1
         if index == steps:
             index = 0
-            write_sample(out, row, settings, counts, angle, speed, regime, xt, vt, xw, vw, chip)
+            samples += 1
+            write_sample(
+                out, row, samples / rate, turns + angle, xt, vt, xw, vw,
+                max(chip, 0.0) if may_leave else chip + nominal, stiffness * chip,
+            )  # fmt: skip
             row += 1
 
     numbers[layout.TOOL_X], numbers[layout.TOOL_V] = xt, vt
@@ -138,5 +146,5 @@ def take_quiet_steps(
     numbers[layout.MET], numbers[layout.MET_SLOPE] = met, met_slope
     numbers[layout.MET_CURVATURE] = met_curvature
     counts[layout.POINTER], counts[layout.HEAD] = pointer, head
-    counts[layout.PIECES] += taken
+    counts[layout.SAMPLES], counts[layout.PIECES] = samples, pieces
     return row, index

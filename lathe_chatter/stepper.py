@@ -25,8 +25,28 @@ from lathe_chatter.pieces import (
     take_step,
     write_sample,
 )
-from lathe_chatter.propagation import TERMS
+from lathe_chatter.propagation import IN_CUT, TERMS
 from lathe_chatter.quiet import take_quiet_steps
+
+
+@njit(cache=True, error_model='numpy')
+def _write_present(
+    numbers: Array, counts: Integers, settings: Array, out: Array, row: int
+) -> None:
+    """Count and write the sample of the present state."""
+    counts[layout.SAMPLES] += 1
+    xt, xw = numbers[layout.TOOL_X], numbers[layout.WORKPIECE_X]
+    chip = xt - xw - (numbers[layout.MET] - numbers[layout.FED])
+    in_cut = counts[layout.REGIME] & IN_CUT != 0
+    thickness = chip + settings[layout.NOMINAL_FEED_SPEED] / numbers[layout.SPEED]
+    if settings[layout.MAY_LEAVE_CUT] != 0.0:
+        thickness = max(chip, 0.0)
+    write_sample(
+        out, row, counts[layout.SAMPLES] / settings[layout.SAMPLE_RATE],
+        counts[layout.TURNS] + numbers[layout.ANGLE],
+        xt, numbers[layout.TOOL_V], xw, numbers[layout.WORKPIECE_V],
+        thickness, settings[layout.CUTTING_STIFFNESS] * chip if in_cut else 0.0,
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model='numpy', nogil=True)
@@ -99,12 +119,7 @@ def advance(
             if not (abs(xt) <= settings[layout.LIMIT] and abs(xw) <= settings[layout.LIMIT]):
                 status = layout.GUARD
                 break
-            chip = xt - xw - (numbers[layout.MET] - numbers[layout.FED])
-            write_sample(
-                out, row, settings, counts, numbers[layout.ANGLE], numbers[layout.SPEED],
-                counts[layout.REGIME], xt, numbers[layout.TOOL_V], xw,
-                numbers[layout.WORKPIECE_V], chip,
-            )  # fmt: skip
+            _write_present(numbers, counts, settings, out, row)
             if measured:
                 add_measurement(out, row, settings, numbers[layout.SPEED], seed)
             row += 1

@@ -62,7 +62,8 @@ def start_wrong(executable: Path, **environment: str) -> subprocess.CompletedPro
 def test_ros2_run_finds_the_executables_after_pip_install(sources: Path, tmp_path: Path) -> None:
     index = pytest.importorskip('ament_index_python.packages', reason='ROS 2 is not there')
     prefix = tmp_path / 'prefix'
-    options = ['--no-deps', '--no-build-isolation', '--prefix', str(prefix)]
+    # Without --ignore-installed pip would remove the package from this very environment.
+    options = ['--no-deps', '--no-build-isolation', '--ignore-installed', '--prefix', str(prefix)]
     done = run([sys.executable, '-m', 'pip', 'install', *options, str(sources)])
     assert done.returncode == 0, done.stderr
     before = os.environ.get('AMENT_PREFIX_PATH', '')
