@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Array
 from lathe_chatter.propagation import slope_at, value_at
 
@@ -13,7 +12,7 @@ _ITERATIONS = 60
 _CLOSE = 1e-15
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def _root(series: Array, terms: int, sign: float, low: float, high: float) -> float:
     """The root of sign * series between `low` (positive there) and `high` (negative)."""
     place = 0.5 * (low + high)
@@ -33,7 +32,7 @@ def _root(series: Array, terms: int, sign: float, low: float, high: float) -> fl
     return place
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def _turning_point(series: Array, terms: int, rising_first: bool) -> float:
     """Where the slope changes sign between 0 and 1, by bisection: it happens twice a period."""
     low, high = 0.0, 1.0
@@ -48,7 +47,7 @@ def _turning_point(series: Array, terms: int, rising_first: bool) -> float:
     return 0.5 * (low + high)
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def first_crossing(series: Array, terms: int, sign: float) -> float:
     """Where sign * series, a margin that should stay positive, first falls below zero.
 
@@ -82,7 +81,7 @@ def first_crossing(series: Array, terms: int, sign: float) -> float:
     return NEVER
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def may_turn_back(
     start: float, slope: float, end: float, slope_end: float, duration: float
 ) -> bool:

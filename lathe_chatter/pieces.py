@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
 from lathe_chatter import layout, noise, propagation, surface
+from lathe_chatter.compiled import compiled
 from lathe_chatter.events import NEVER, first_crossing, may_turn_back
 from lathe_chatter.model import Array, Integers
 from lathe_chatter.propagation import (
@@ -51,7 +50,7 @@ class Scratch(NamedTuple):
 PIECE_SIZE = 16
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def add(high: float, low: float, increment: float) -> tuple[float, float]:
     """Compensated addition: a turn of 10^5 steps sums as exactly as one step."""
     increment += low
@@ -59,13 +58,13 @@ def add(high: float, low: float, increment: float) -> tuple[float, float]:
     return total, increment - (total - high)
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def has_room(capacity: int, head: int, pointer: int, steps: int) -> bool:
     """Whether the surface can take a sample: the corners of a turn and the events of its steps."""
     return capacity - head > (FLIPS + 1) * steps + (head - pointer) + 2
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def write_sample(
     out: Array, row: int, time: float, angle: float, xt: float, vt: float, xw: float, vw: float,
     chip: float, force: float,
@@ -76,7 +75,7 @@ def write_sample(
     out[row, 6], out[row, 7] = chip, force
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: int) -> None:
     """Add to a sample what sensors see beside the motion: runout and their own noise."""
     turn = 2.0 * math.pi * (out[row, 1] % 1.0)
@@ -92,13 +91,13 @@ def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: i
         )
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _lower(order: int, other: int) -> int:
     """The lower of two orders of a corner, where 0 stands for none."""
     return other if order == 0 else min(order, other)
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _finish_corner(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, matrices: Array,
     force: float, speed: float, acceleration: float,
@@ -110,8 +109,7 @@ def _finish_corner(
         xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
         xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
         met = numbers[layout.MET] - numbers[layout.FED]
-        bend = relative_acceleration(
-            matrices[regime], xt, vt, xw, vw, met, force)
+        bend = relative_acceleration(matrices[regime], xt, vt, xw, vw, met, force)
         slope = (settings[layout.FEED_SPEED] + vt - vw) / speed
         curvature = (bend - slope * acceleration) / (speed * speed)
     nodes[head, surface.SLOPE_AFTER] = slope
@@ -120,7 +118,7 @@ def _finish_corner(
     counts[layout.CORNER] = 0
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _plan(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, limit: float,
     merge: float, piece: Array,
@@ -191,7 +189,7 @@ def _plan(
     return node, at_node, ramp_ends
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _solve_series(
     numbers: Array, regime: int, mechanics: Array, force: float, scratch: Scratch
 ) -> None:
@@ -208,26 +206,29 @@ def _solve_series(
     )
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _solve(
     numbers: Array, regime: int, mechanics: Array, matrices: Array, force: float, step: float,
     scratch: Scratch,
 ) -> None:  # fmt: skip
     """The state at the end of the planned piece: by matrix if it is a whole step."""
     piece, end = scratch.piece, scratch.end
-    if piece[DURATION] == step and force == 0.0:
+    if piece[DURATION] == step:
         end[0], end[1], end[2], end[3] = whole_step(
             matrices[regime], numbers[layout.TOOL_X], numbers[layout.TOOL_V],
             numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V],
             piece[MET_0], piece[RATE_0], piece[BEND_0],
             piece[MET_1], piece[RATE_1], piece[BEND_1],
         )  # fmt: skip
+        if force != 0.0:
+            for k in range(4):
+                end[k] += matrices[regime, propagation.FORCE_ROW, k] * force
     else:
         _solve_series(numbers, regime, mechanics, force, scratch)
         propagation.end_state(scratch.tool, scratch.workpiece, piece[DURATION], end)
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _find_event(
     numbers: Array, regime: int, mechanics: Array, settings: Array, force: float, scratch: Scratch
 ) -> tuple[float, int]:
@@ -273,7 +274,7 @@ def _find_event(
     return (place, event) if place <= 1.0 else (NEVER, layout.NO_EVENT)
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _leave_surface(
     counts: Integers, nodes: Array, settings: Array, matrices: Array, force: float, step: float,
     scratch: Scratch,
@@ -295,7 +296,7 @@ def _leave_surface(
     surface.write_node(nodes, counts[layout.HEAD], piece[ANGLE_1], height, slope, curvature, pitch)
 
 
-@njit(cache=True, error_model='numpy')
+@compiled(inline=True)
 def _move_on(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, node: int,
     at_node: bool, ramp_ends: bool, scratch: Scratch,
@@ -334,7 +335,7 @@ def _move_on(
         numbers[layout.FED] = 0.0
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def take_step(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, mechanics: Array,
     matrices: Array, force: float, index: int, events: Array, found: int, scratch: Scratch,

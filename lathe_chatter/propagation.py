@@ -17,8 +17,8 @@ into a matrix; the pieces around an event are summed as they come.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Array
 
 TERMS = 14
@@ -40,14 +40,15 @@ RATE_STEP = 0.12
 ) = range(9)
 MECHANICS_SIZE = 9
 
-ROWS = 13
+ROWS = 14
+FORCE_ROW = 11
 """Of the matrix of a regime, see `step_matrices`."""
 OUT_OF_CUT, IN_CUT, ENGAGED = 0, 1, 2
 REGIMES = 4
 """A regime is the sum of IN_CUT and ENGAGED where they hold."""
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def quintic(u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array) -> None:
     """Coefficients (6,) of the quintic on [0, 1] with these values, slopes and curvatures."""
     rise = u1 - u0 - d0 - 0.5 * e0
@@ -61,7 +62,7 @@ def quintic(u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, ou
     out[5] = 6.0 * rise - 3.0 * steep + 0.5 * bend
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def solve_piece(
     state: Array,
     duration: float,
@@ -114,7 +115,7 @@ def solve_piece(
         )
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def value_at(series: Array, terms: int, place: float) -> float:
     """A power series at `place`."""
     total: float = series[terms - 1]
@@ -123,7 +124,7 @@ def value_at(series: Array, terms: int, place: float) -> float:
     return total
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def slope_at(series: Array, terms: int, place: float) -> float:
     """The derivative of a power series at `place`."""
     total: float = (terms - 1) * series[terms - 1]
@@ -132,7 +133,7 @@ def slope_at(series: Array, terms: int, place: float) -> float:
     return total
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def end_state(tool: Array, workpiece: Array, duration: float, state: Array) -> None:
     """Write the state (4,) at the end of a solved piece."""
     state[0] = value_at(tool, TERMS, 1.0)
@@ -141,7 +142,7 @@ def end_state(tool: Array, workpiece: Array, duration: float, state: Array) -> N
     state[3] = slope_at(workpiece, TERMS, 1.0) / duration
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def whole_step(
     m: Array, x0: float, x1: float, x2: float, x3: float,
     u0: float, u1: float, u2: float, u3: float, u4: float, u5: float,
@@ -172,29 +173,29 @@ def whole_step(
     )  # fmt: skip
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def relative_acceleration(
     m: Array, x0: float, x1: float, x2: float, x3: float, met: float,
     force: float,
 ) -> float:  # fmt: skip
     """r'' = x_t'' - x_wp'' of a state that meets the surface at `met`, m/s2."""
     result: float = (
-        ((m[11, 0] * x0 + m[11, 1] * x1) + (m[11, 2] * x2 + m[11, 3] * x3))
-        + (m[12, 0] * met + m[12, 1] * force)
-        + m[12, 2]
+        ((m[12, 0] * x0 + m[12, 1] * x1) + (m[12, 2] * x2 + m[12, 3] * x3))
+        + (m[13, 0] * met + m[13, 1] * force)
+        + m[13, 2]
     )
     return result
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def step_matrices(step: float, mechanics: Array) -> Array:
     """The exact response to a whole step in each regime (REGIMES, ROWS, 4).
 
     Rows 0-9 are what one unit of an input adds to the state (4) at the end: the state (4) at
     the start, U, U' and U'' at the start and then at the end of the step; row 10 is what the
-    bearing's clearance adds. They are sums of the same series as a piece: no second method.
-    Rows 11 and 12 are the relative acceleration per unit of the state (4), then of U, of a
-    force on the tool, and its constant part.
+    bearing's clearance adds, row 11 what a force of 1 N on the tool does. They are sums of the
+    same series as a piece: no second method. Rows 12 and 13 are the relative acceleration per
+    unit of the state (4), then of U, of a force on the tool, and its constant part.
     """
     result = np.zeros((REGIMES, ROWS, 4))
     tool, workpiece = np.zeros(TERMS), np.zeros(TERMS)
@@ -202,7 +203,7 @@ def step_matrices(step: float, mechanics: Array) -> Array:
     bare = mechanics.copy()
     bare[CLEARANCE] = 0.0
     for regime in range(REGIMES):
-        for source in range(11):
+        for source in range(12):
             state[:] = 0.0
             ends[:] = 0.0
             if source < 4:
@@ -212,18 +213,19 @@ def step_matrices(step: float, mechanics: Array) -> Array:
                 ends[source - 4] = 1.0 if order == 0 else step if order == 1 else step * step
             quintic(ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], surface)
             constants = mechanics if source == 10 else bare
-            solve_piece(state, step, regime, constants, 0.0, surface, tool, workpiece)
+            force = 1.0 if source == FORCE_ROW else 0.0
+            solve_piece(state, step, regime, constants, force, surface, tool, workpiece)
             end_state(tool, workpiece, step, state)
             result[regime, source] = state
         cutting = 0.0
         if regime & IN_CUT != 0:
             cutting = mechanics[TOOL_CUTTING] + mechanics[WORKPIECE_CUTTING]
         bearing = mechanics[BEARING_STIFFNESS] if regime & ENGAGED != 0 else 0.0
-        result[regime, 11, 0] = -mechanics[TOOL_STIFFNESS] - cutting
-        result[regime, 11, 1] = -mechanics[TOOL_DAMPING]
-        result[regime, 11, 2] = mechanics[WORKPIECE_STIFFNESS] + bearing + cutting
-        result[regime, 11, 3] = mechanics[WORKPIECE_DAMPING]
-        result[regime, 12, 0] = cutting
-        result[regime, 12, 1] = mechanics[TOOL_COMPLIANCE]
-        result[regime, 12, 2] = -bearing * mechanics[CLEARANCE]
+        result[regime, 12, 0] = -mechanics[TOOL_STIFFNESS] - cutting
+        result[regime, 12, 1] = -mechanics[TOOL_DAMPING]
+        result[regime, 12, 2] = mechanics[WORKPIECE_STIFFNESS] + bearing + cutting
+        result[regime, 12, 3] = mechanics[WORKPIECE_DAMPING]
+        result[regime, 13, 0] = cutting
+        result[regime, 13, 1] = mechanics[TOOL_COMPLIANCE]
+        result[regime, 13, 2] = -bearing * mechanics[CLEARANCE]
     return result

@@ -7,9 +7,8 @@ stops before the first that is not, which pieces.py then takes.
 
 from __future__ import annotations
 
-from numba import njit
-
 from lathe_chatter import layout, surface
+from lathe_chatter.compiled import compiled
 from lathe_chatter.events import may_turn_back
 from lathe_chatter.model import Array, Integers
 from lathe_chatter.pieces import DETAIL, add, has_room, write_sample
@@ -22,7 +21,7 @@ from lathe_chatter.propagation import (
 )
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def take_quiet_steps(
     numbers: Array,
     counts: Integers,
@@ -94,9 +93,7 @@ def take_quiet_steps(
         new_fed, new_fed_low = add(fed, fed_low, feed)
         u1 = next_met - new_fed
         du1, ddu1 = next_slope * speed - feed_speed, next_curvature * square
-        xt1, vt1, xw1, vw1 = whole_step(
-            matrix, xt, vt, xw, vw, u0, du0, ddu0, u1, du1, ddu1
-        )
+        xt1, vt1, xw1, vw1 = whole_step(matrix, xt, vt, xw, vw, u0, du0, ddu0, u1, du1, ddu1)
         chip = xt1 - xw1 - u1
         if has_clearance and may_turn_back(
             bearing_side * (xw - clearance), bearing_side * vw,

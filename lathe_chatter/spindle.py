@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from lathe_chatter.compiled import compiled
 
 _NEWTON_STEPS = 20
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def speed_and_slope(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> tuple[float, float]:
@@ -26,7 +26,7 @@ def speed_and_slope(
     return base * factor, slope * factor + base * swing
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def turned(
     time: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
@@ -54,7 +54,7 @@ def turned(
     return even + amplitude * swing
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def time_to_turn(
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:

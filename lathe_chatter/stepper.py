@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from lathe_chatter import layout, noise
+from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Array, Integers
 from lathe_chatter.pieces import (
     FLIPS,
@@ -29,7 +29,7 @@ from lathe_chatter.propagation import IN_CUT, TERMS
 from lathe_chatter.quiet import take_quiet_steps
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def _write_present(
     numbers: Array, counts: Integers, settings: Array, out: Array, row: int
 ) -> None:
@@ -49,7 +49,7 @@ def _write_present(
     )  # fmt: skip
 
 
-@njit(cache=True, error_model='numpy', nogil=True)
+@compiled(nogil=True)
 def advance(
     numbers: Array,
     counts: Integers,

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Array
 
 # One node is one cache line of 8 numbers.
@@ -50,7 +50,7 @@ def fresh_surface(slope: float, capacity: int) -> Array:
     return nodes
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
     """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
     width = nodes[left + 1, ANGLE] - nodes[left, ANGLE]
@@ -76,7 +76,7 @@ def grown(nodes: Array) -> Array:
     return np.concatenate([nodes, np.zeros_like(nodes)])
 
 
-@njit(cache=True, error_model='numpy', forceinline=True)
+@compiled(inline=True)
 def write_node(
     nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float,
     pitch: float,
@@ -90,7 +90,7 @@ def write_node(
     nodes[node, PITCH] = pitch
 
 
-@njit(cache=True, error_model='numpy')
+@compiled()
 def next_turn(nodes: Array, first: int, last: int, advance: float) -> None:
     """Forget what lies before node `first`, and count angle and feed from the new turn on.
 
