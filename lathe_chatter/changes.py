@@ -64,6 +64,20 @@ def parse_change(sentence: str) -> Change | None:
     return Change(float(match['time']), old, new)
 
 
+def on_the_shop_floor(name: str, value: Any) -> str:
+    """A field of a cut with its value, short and in the units of the shop floor."""
+    if name == 'depth_of_cut':
+        return f'depth {value * 1e3:g} mm'
+    if name == 'spindle_speed_rpm':
+        return f'{value:g} rev/min'
+    if name == 'bearing_clearance':
+        return f'clearance {value * 1e6:g} µm'
+    if name == 'bearing_contact':
+        return f'contact {_shown(value)}'
+    shown = f'{value:g}' if isinstance(value, float) else _shown(value)
+    return f'{name} {shown}'
+
+
 def _differences(old: Cut, new: Cut) -> Iterator[str]:
     """Each field that differs, with its unit; repr keeps every bit of a number."""
     for entry in fields(Cut):

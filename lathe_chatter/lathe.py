@@ -35,6 +35,7 @@ DISPLACEMENT_LIMIT = Quantity(
 _STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)
 _IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
 _TURN_PER_STEP = 0.05
+_MOST_STEPS = 100_000
 
 
 class EventKind(IntEnum):
@@ -139,6 +140,8 @@ class VirtualLathe:
         self.spindle_acceleration = SPINDLE_ACCELERATION.check(
             'spindle_acceleration', spindle_acceleration
         )
+        if not isinstance(seed, (int, np.integer)):
+            raise ParameterError('seed', seed, '', 'a whole number')
         self.seed = int(SEED.check('seed', seed))
         self.displacement_limit = DISPLACEMENT_LIMIT.check(
             'displacement_limit', displacement_limit
@@ -203,7 +206,7 @@ class VirtualLathe:
         Raises:
             ParameterError: If `samples` is negative.
         """
-        if samples < 0:
+        if not isinstance(samples, (int, np.integer)) or samples < 0:
             raise ParameterError('samples', samples, '', 'a whole number of 0 or more')
         out = np.empty((0 if self.guard else samples, len(SAMPLE_COLUMNS)))
         self.events = []
@@ -212,7 +215,7 @@ class VirtualLathe:
             done, found, status = self._call(out[rows:])
             rows += done
             self.events += [
-                Event(int(before) / self.sample_rate + since, EventKind(int(kind)))
+                Event(float(before / self.sample_rate + since), EventKind(int(kind)))
                 for before, since, kind in self._event_space[:found]
             ]
             if status == layout.SURFACE_FULL:
@@ -292,9 +295,9 @@ class VirtualLathe:
     def _fresh(self, cut: Cut, initial_state: Sequence[float] | Array | None) -> LatheState:
         """The state at t = 0, with a smooth surface of the turn before."""
         given = paper_initial_state(cut) if initial_state is None else initial_state
-        start = np.array([_STATE.check('initial_state', value) for value in given])
-        if start.shape != (4,):
+        if np.shape(given) != (4,):
             raise ParameterError('initial_state', given, '', 'four numbers')
+        start = np.array([_STATE.check('initial_state', value) for value in given])
         numbers = np.zeros(layout.NUMBERS_SIZE)
         numbers[:4] = start
         speed = cut.spindle_speed_rpm / 60.0
@@ -369,4 +372,10 @@ class VirtualLathe:
         speed = max(cut.spindle_speed_rpm / 60.0, float(state.numbers[layout.SPEED]))
         speed *= 1.0 + cut.speed_variation_amplitude
         needed = max(fastest / propagation.RATE_STEP, speed / _TURN_PER_STEP)
+        if needed > _MOST_STEPS * self.sample_rate:
+            allowed = (
+                f'at least {needed / _MOST_STEPS:.0f} Hz for a machine with motions of up to '
+                f'{fastest:.0f} rad/s'
+            )
+            raise ParameterError('sample_rate', self.sample_rate, 'Hz', allowed)
         state.counts[layout.STEPS] = max(1, math.ceil(needed / self.sample_rate))

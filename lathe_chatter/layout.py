@@ -15,8 +15,9 @@ from __future__ import annotations
     SPEED,  # rev/s, without its variation
     PHASE,  # of the speed variation, cycles in [0, 1)
     MET, MET_SLOPE, MET_CURVATURE,  # the surface at the tool, by angle: m, m/rev, m/rev2
-) = range(13)  # fmt: skip
-NUMBERS_SIZE = 13
+    LEFT,  # of a step that was begun, s; 0 between steps
+) = range(14)  # fmt: skip
+NUMBERS_SIZE = 14
 
 # counts: what it remembers as integers.
 (
@@ -25,11 +26,14 @@ NUMBERS_SIZE = 13
     REGIME,  # propagation.IN_CUT + propagation.ENGAGED, where they hold
     POINTER,  # the node at or before the place that the tool meets
     HEAD,  # the newest node
-    CORNER,  # lowest derivative of the surface that jumps at the head, 0 for none
+    CORNER,  # lowest derivative of the motion that jumps at the head, 0 for none
+    SURFACE_CORNER,  # the same of the surface left there where it is not the motion's
     PIECES,  # whole and cut steps since the start
     STEPS,  # per sample
-) = range(8)
-COUNTS_SIZE = 8
+    STEP,  # of the sample under way that is next
+    FLIPS,  # events in the step under way
+) = range(11)
+COUNTS_SIZE = 11
 
 # settings: what machine and cut ask for.
 (

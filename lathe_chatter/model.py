@@ -55,7 +55,7 @@ class Mode:
         ParameterError: If a value is not finite or outside its limits.
     """
 
-    mass: float = quantity('modal mass', 'kg', high=1e4, exclusive=True)
+    mass: float = quantity('modal mass', 'kg', low=1e-6, high=1e4)
     natural_frequency: float = quantity(
         'undamped natural frequency', 'rad/s', high=1e6, exclusive=True
     )
@@ -160,7 +160,10 @@ class Cut:
     bearing_contact: BearingContact = BearingContact.GAP
     feed_speed: float = quantity('feed speed', 'm/s', default=0.0025, high=0.1)
     force_noise: float = quantity(
-        'density of the random force on the tool', 'N/sqrt(Hz)', default=0.0, high=1e3
+        'random force on the tool: its mean over T s has the variance force_noise^2/T',
+        'N/sqrt(Hz)',
+        default=0.0,
+        high=1e3,
     )
     sensor_noise: float = quantity(
         'noise of the measured displacements, rms per sample', 'm', default=0.0, high=1e-3

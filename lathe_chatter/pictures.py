@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lathe_chatter.changes import on_the_shop_floor
 from lathe_chatter.history import History
 from lathe_chatter.model import Array, BearingContact
 
@@ -98,29 +99,18 @@ def _mark(axes: Axes, history: History) -> None:
 def _label_changes(axes: Axes, history: History) -> None:
     """Say above the plot what changed, and where the flag was up."""
     for change in history.changes:
-        text = '\n'.join(_change_text(name, value) for name, value in change.new.items())
+        text = '\n'.join(on_the_shop_floor(name, value) for name, value in change.new.items())
         axes.annotate(
             text, (change.time, 1.0), (3, 4), xycoords=('data', 'axes fraction'),
             textcoords='offset points', fontsize=9, va='bottom',
         )  # fmt: skip
     spans = history.chatter_spans()
     if spans:
-        start, end = spans[0]
+        start, _ = spans[0]
         axes.annotate(
-            'chatter flagged', (0.5 * (start + end), 0.97), xycoords=('data', 'axes fraction'),
-            ha='center', va='top', fontsize=9, color='#8a3c66',
+            'chatter flagged', (max(start, 0.0), 0.04), (3, 0), xycoords=('data', 'axes fraction'),
+            textcoords='offset points', fontsize=9, color='#8a3c66',
         )  # fmt: skip
-
-
-def _change_text(name: str, value: object) -> str:
-    """A changed parameter in the units of the shop floor."""
-    if name == 'depth_of_cut' and isinstance(value, float):
-        return f'depth {value * 1e3:g} mm'
-    if name == 'spindle_speed_rpm' and isinstance(value, float):
-        return f'{value:g} rev/min'
-    if name == 'bearing_clearance' and isinstance(value, float):
-        return f'clearance {value * _MICRO:g} µm'
-    return f'{name} {value}'
 
 
 def _moments(history: History) -> list[tuple[str, float]]:
@@ -146,7 +136,7 @@ def _draw_moment(axes: Axes, history: History, title: str, until: float) -> None
         axes.plot(
             samples[f'{name}_displacement'][inside] * _MICRO,
             samples[f'{name}_velocity'][inside] * 1e3,
-            color=colour, lw=0.8, label=name,
+            color=colour, lw=0.8, label=name, marker='o', ms=3, markevery=[-1],
         )  # fmt: skip
     # A cut at rest is a point: without a floor the axes would show rounding as motion.
     for low_high, setter in (

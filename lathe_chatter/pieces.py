@@ -23,7 +23,7 @@ from lathe_chatter.propagation import (
 )
 from lathe_chatter.spindle import speed_and_slope, time_to_turn, turned
 
-FLIPS = 32
+_MOST_FLIPS = 32
 """Events in one step before it is finished without looking for more: a grazing contact that
 rounding cannot decide is no reason to stand still."""
 DETAIL = 1.5
@@ -59,12 +59,6 @@ def add(high: float, low: float, increment: float) -> tuple[float, float]:
 
 
 @compiled(inline=True)
-def has_room(capacity: int, head: int, pointer: int, steps: int) -> bool:
-    """Whether the surface can take a sample: the corners of a turn and the events of its steps."""
-    return capacity - head > (FLIPS + 1) * steps + (head - pointer) + 2
-
-
-@compiled(inline=True)
 def write_sample(
     out: Array, row: int, time: float, angle: float, xt: float, vt: float, xw: float, vw: float,
     chip: float, force: float,
@@ -94,7 +88,7 @@ def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: i
 @compiled(inline=True)
 def _lower(order: int, other: int) -> int:
     """The lower of two orders of a corner, where 0 stands for none."""
-    return other if order == 0 else min(order, other)
+    return max(order, other) if order == 0 or other == 0 else min(order, other)
 
 
 @compiled(inline=True)
@@ -105,7 +99,9 @@ def _finish_corner(
     """Write what follows the newest node, a corner: it differs from what led to it."""
     head, regime = counts[layout.HEAD], counts[layout.REGIME]
     slope, curvature = numbers[layout.MET_SLOPE], numbers[layout.MET_CURVATURE]
+    order = counts[layout.SURFACE_CORNER]
     if regime & IN_CUT != 0:
+        order = _lower(order, counts[layout.CORNER])
         xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
         xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
         met = numbers[layout.MET] - numbers[layout.FED]
@@ -114,8 +110,9 @@ def _finish_corner(
         curvature = (bend - slope * acceleration) / (speed * speed)
     nodes[head, surface.SLOPE_AFTER] = slope
     nodes[head, surface.CURVATURE_AFTER] = curvature
-    nodes[head, surface.ORDER] = min(nodes[head, surface.ORDER], counts[layout.CORNER])
-    counts[layout.CORNER] = 0
+    if order > 0:
+        nodes[head, surface.ORDER] = min(nodes[head, surface.ORDER], order)
+    counts[layout.CORNER] = counts[layout.SURFACE_CORNER] = 0
 
 
 @compiled(inline=True)
@@ -141,7 +138,8 @@ def _plan(
     rise = speed * duration
     if not steady:
         rise = turned(duration, speed, slope, variation, phase, frequency)
-    node, pitch = counts[layout.POINTER], nodes[counts[layout.POINTER], surface.PITCH]
+    node = counts[layout.POINTER]
+    pitch = nodes[node + 1, surface.PITCH]
     if rise > DETAIL * pitch:
         duration, ramp_ends = duration * (0.8 * DETAIL * pitch / rise), False
         rise = speed * duration
@@ -291,7 +289,7 @@ def _leave_surface(
         slope = (settings[layout.FEED_SPEED] + end[1] - end[3]) / speed
         curvature = (bend - slope * piece[SPEED_SLOPE_1]) / (speed * speed)
     else:
-        pitch = min(pitch, nodes[counts[layout.POINTER], surface.PITCH])
+        pitch = min(pitch, nodes[counts[layout.POINTER] + 1, surface.PITCH])
     counts[layout.HEAD] += 1
     surface.write_node(nodes, counts[layout.HEAD], piece[ANGLE_1], height, slope, curvature, pitch)
 
@@ -310,8 +308,10 @@ def _move_on(
         numbers[layout.MET_CURVATURE] = nodes[node, surface.CURVATURE_AFTER]
         # A corner comes back two orders smoother, through a force; or as it was, uncut.
         order = int(nodes[node, surface.ORDER])
-        order += 2 if counts[layout.REGIME] & IN_CUT != 0 else 0
-        counts[layout.CORNER] = order if order <= surface.LAST_ORDER else 0
+        if counts[layout.REGIME] & IN_CUT == 0:
+            counts[layout.SURFACE_CORNER] = order
+        elif order + 2 <= surface.LAST_ORDER:
+            counts[layout.CORNER] = order + 2
     for k in range(4):
         numbers[k] = scratch.end[k]
     numbers[layout.ANGLE], numbers[layout.ANGLE_LOW] = piece[ANGLE_1], piece[ANGLE_LOW_1]
@@ -338,23 +338,28 @@ def _move_on(
 @compiled()
 def take_step(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, mechanics: Array,
-    matrices: Array, force: float, index: int, events: Array, found: int, scratch: Scratch,
-) -> int:  # fmt: skip
-    """Take step `index` of a sample; arrays as in `stepper.advance`.
+    matrices: Array, force: float, events: Array, found: int, scratch: Scratch,
+) -> tuple[int, int]:  # fmt: skip
+    """Take the step that is next, or finish one that was begun; arrays as in `stepper.advance`.
 
     Args:
         force: On the tool, held over the step, N.
-        index: Of the step in its sample.
         found: Events written so far.
 
     Returns:
-        Events written so far.
+        Events written so far, and FINISHED; or, with the rest of the step noted, SURFACE_FULL
+        or EVENTS_FULL.
     """
     piece = scratch.piece
     step = 1.0 / (settings[layout.SAMPLE_RATE] * counts[layout.STEPS])
     merge = surface.MERGE * step
-    left, flips = step, 0
-    while left > 0.0:
+    if numbers[layout.LEFT] == 0.0:
+        numbers[layout.LEFT], counts[layout.FLIPS] = step, 0
+    while numbers[layout.LEFT] > 0.0:
+        if counts[layout.HEAD] + 2 >= nodes.shape[0]:
+            return found, layout.SURFACE_FULL
+        if found == events.shape[0]:
+            return found, layout.EVENTS_FULL
         slope = 0.0
         if numbers[layout.SPEED] != settings[layout.TARGET_SPEED]:
             slope = math.copysign(
@@ -367,7 +372,7 @@ def take_step(
                 numbers[layout.SPEED], slope, settings[layout.VARIATION],
                 numbers[layout.PHASE], settings[layout.VARIATION_FREQUENCY],
             )  # fmt: skip
-        if counts[layout.CORNER] > 0:
+        if counts[layout.CORNER] > 0 or counts[layout.SURFACE_CORNER] > 0:
             _finish_corner(numbers, counts, nodes, settings, matrices, force, speed, acceleration)
         piece[MET_0] = numbers[layout.MET] - numbers[layout.FED]
         piece[RATE_0] = numbers[layout.MET_SLOPE] * speed - settings[layout.FEED_SPEED]
@@ -375,13 +380,13 @@ def take_step(
             numbers[layout.MET_CURVATURE] * speed * speed
             + numbers[layout.MET_SLOPE] * acceleration
         )
-        regime = counts[layout.REGIME]
+        regime, left = counts[layout.REGIME], numbers[layout.LEFT]
         node, at_node, ramp_ends = _plan(
             numbers, counts, nodes, settings, slope, left, merge, piece
         )
         _solve(numbers, regime, mechanics, matrices, force, step, scratch)
         event = layout.NO_EVENT
-        if flips < FLIPS:
+        if counts[layout.FLIPS] < _MOST_FLIPS:
             place, event = _find_event(numbers, regime, mechanics, settings, force, scratch)
         if event != layout.NO_EVENT:
             until = place * piece[DURATION]
@@ -394,19 +399,20 @@ def take_step(
             elif until <= merge:
                 piece[DURATION] = 0.0
             events[found, 0] = counts[layout.SAMPLES]
-            events[found, 1] = (index + 1) * step - left + piece[DURATION]
+            events[found, 1] = (counts[layout.STEP] + 1) * step - left + piece[DURATION]
             events[found, 2] = event
             found += 1
-            flips += 1
+            counts[layout.FLIPS] += 1
         if piece[DURATION] > 0.0:
             _leave_surface(counts, nodes, settings, matrices, force, step, scratch)
             _move_on(numbers, counts, nodes, settings, slope, node, at_node, ramp_ends, scratch)
             left -= piece[DURATION]
-            if left <= 0.5 * merge:
-                left = 0.0
-        if event != layout.NO_EVENT:
-            # Contact leaves a kink in a third derivative, the end of a cut one in the surface.
-            of_bearing = event <= layout.BEARING_RELEASES
-            counts[layout.REGIME] ^= ENGAGED if of_bearing else IN_CUT
-            counts[layout.CORNER] = _lower(counts[layout.CORNER], 3 if of_bearing else 1)
-    return found
+            numbers[layout.LEFT] = left if left > 0.5 * merge else 0.0
+        if event >= layout.TOOL_LEAVES:
+            # Out of the cut the surface is another: it has a corner, whatever the motion has.
+            counts[layout.REGIME] ^= IN_CUT
+            counts[layout.SURFACE_CORNER] = 1
+        elif event != layout.NO_EVENT:
+            counts[layout.REGIME] ^= ENGAGED
+            counts[layout.CORNER] = _lower(counts[layout.CORNER], 3)
+    return found, layout.FINISHED

@@ -11,7 +11,7 @@ from lathe_chatter import layout, surface
 from lathe_chatter.compiled import compiled
 from lathe_chatter.events import may_turn_back
 from lathe_chatter.model import Array, Integers
-from lathe_chatter.pieces import DETAIL, add, has_room, write_sample
+from lathe_chatter.pieces import DETAIL, add, write_sample
 from lathe_chatter.propagation import (
     CLEARANCE,
     ENGAGED,
@@ -31,18 +31,19 @@ def take_quiet_steps(
     matrices: Array,
     out: Array,
     row: int,
-    index: int,
-) -> tuple[int, int]:
-    """Take quiet steps from step `index` of sample `row` on; arrays as in `stepper.advance`.
+) -> int:
+    """Take quiet steps, beginning with sample `row`; arrays as in `stepper.advance`.
 
     Returns:
-        The sample and the step in it that are next.
+        The sample that is next.
     """
     speed, feed_speed = numbers[layout.SPEED], settings[layout.FEED_SPEED]
     unsteady = speed != settings[layout.TARGET_SPEED] or settings[layout.VARIATION] != 0.0
-    if unsteady or counts[layout.CORNER] != 0 or settings[layout.FORCE_NOISE] != 0.0:
-        return row, index
-    steps = counts[layout.STEPS]
+    corner = counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0
+    begun = numbers[layout.LEFT] != 0.0
+    if unsteady or corner or begun or settings[layout.FORCE_NOISE] != 0.0:
+        return row
+    steps, index = counts[layout.STEPS], counts[layout.STEP]
     rate = settings[layout.SAMPLE_RATE]
     step = 1.0 / (rate * steps)
     rise, near = speed * step, surface.MERGE * step * speed
@@ -70,9 +71,9 @@ def take_quiet_steps(
     samples, turns, pieces = counts[layout.SAMPLES], counts[layout.TURNS], counts[layout.PIECES]
     u0, du0, ddu0 = met - fed, met_slope * speed - feed_speed, met_curvature * square
 
-    while row < out.shape[0] and has_room(nodes.shape[0], head, pointer, steps):
+    while row < out.shape[0] and head + 2 < nodes.shape[0]:
         new_angle, new_angle_low = add(angle, angle_low, rise)
-        if new_angle >= 1.0 or rise > DETAIL * nodes[pointer, surface.PITCH]:
+        if new_angle >= 1.0 or rise > DETAIL * nodes[pointer + 1, surface.PITCH]:
             break
         place = new_angle - 1.0
         node = pointer
@@ -118,7 +119,7 @@ def take_quiet_steps(
         else:
             surface.write_node(
                 nodes, head, new_angle, next_met, next_slope, next_curvature,
-                min(rise, nodes[pointer, surface.PITCH]),
+                min(rise, nodes[pointer + 1, surface.PITCH]),
             )  # fmt: skip
         xt, vt, xw, vw = xt1, vt1, xw1, vw1
         u0, du0, ddu0 = u1, du1, ddu1
@@ -144,4 +145,5 @@ def take_quiet_steps(
     numbers[layout.MET_CURVATURE] = met_curvature
     counts[layout.POINTER], counts[layout.HEAD] = pointer, head
     counts[layout.SAMPLES], counts[layout.PIECES] = samples, pieces
-    return row, index
+    counts[layout.STEP] = index
+    return row

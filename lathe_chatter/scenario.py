@@ -145,7 +145,7 @@ def _step(entry: Any, where: str) -> Step:
     if ('at' in entry) == ('when' in entry):
         raise ScenarioError(f'{where} must have either at (a time in s) or when.')
     when = entry.get('when')
-    if when not in {None, FLAGGED, CLEARED}:
+    if 'when' in entry and when not in {FLAGGED, CLEARED}:
         raise ScenarioError(f'{where}: when is {when!r}: it must be {FLAGGED} or {CLEARED}.')
     changes = _mapping(entry, 'set', where)
     if not changes:

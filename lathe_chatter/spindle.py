@@ -42,7 +42,9 @@ def turned(
     z = math.pi * frequency * time
     middle = 2.0 * math.pi * phase + z
     z2 = z * z
-    sinc = 1.0 - z2 / 6.0 * (1.0 - z2 / 20.0 * (1.0 - z2 / 42.0 * (1.0 - z2 / 72.0)))
+    sinc = 1.0 - z2 / 6.0 * (
+        1.0 - z2 / 20.0 * (1.0 - z2 / 42.0 * (1.0 - z2 / 72.0 * (1.0 - z2 / 110.0)))
+    )
     if z > 0.3:
         sinc = math.sin(z) / z
     lever = 1.0 - z2 / 10.0 * (1.0 - z2 / 28.0 * (1.0 - z2 / 54.0 * (1.0 - z2 / 88.0)))

@@ -17,16 +17,15 @@ from lathe_chatter import layout, noise
 from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Array, Integers
 from lathe_chatter.pieces import (
-    FLIPS,
     PIECE_SIZE,
     Scratch,
     add_measurement,
-    has_room,
     take_step,
     write_sample,
 )
 from lathe_chatter.propagation import IN_CUT, TERMS
 from lathe_chatter.quiet import take_quiet_steps
+from lathe_chatter.spindle import speed_and_slope
 
 
 @compiled()
@@ -82,45 +81,42 @@ def advance(
         np.empty(PIECE_SIZE), np.empty(4), np.empty(TERMS), np.empty(TERMS), np.empty(6),
         np.empty(TERMS),
     )  # fmt: skip
-    steps = counts[layout.STEPS]
     measured = settings[layout.RUNOUT] > 0.0 or settings[layout.SENSOR_NOISE] > 0.0
-    row = index = found = 0
-    status, force = layout.FINISHED, 0.0
+    row = found = 0
     while True:
         first = row
-        row, index = take_quiet_steps(
-            numbers, counts, nodes, settings, mechanics, matrices, out, row, index
-        )
+        row = take_quiet_steps(numbers, counts, nodes, settings, mechanics, matrices, out, row)
         if measured:
             for done in range(first, row):
                 add_measurement(out, done, settings, numbers[layout.SPEED], seed)
         if row == out.shape[0]:
-            break
-        if index == 0:
-            if not has_room(nodes.shape[0], counts[layout.HEAD], counts[layout.POINTER], steps):
-                status = layout.SURFACE_FULL
-                break
-            if events.shape[0] - found < FLIPS * steps:
-                status = layout.EVENTS_FULL
-                break
-            if settings[layout.FORCE_NOISE] > 0.0:
-                # Held for a sample: the mean of white noise of this density over that time.
-                force = settings[layout.FORCE_NOISE] * math.sqrt(settings[layout.SAMPLE_RATE])
-                force *= noise.standard_normal(seed, noise.FORCE_STREAM, counts[layout.SAMPLES])
+            return row, found, layout.FINISHED
+        # Which loop takes a step must not depend on the room there is, or bits would.
+        if counts[layout.HEAD] + 2 >= nodes.shape[0]:
+            return row, found, layout.SURFACE_FULL
+        force = 0.0
+        if settings[layout.FORCE_NOISE] > 0.0:
+            # Held for a sample: the mean of white noise of this density over that time.
+            force = settings[layout.FORCE_NOISE] * math.sqrt(settings[layout.SAMPLE_RATE])
+            force *= noise.standard_normal(seed, noise.FORCE_STREAM, counts[layout.SAMPLES])
+            if counts[layout.STEP] == 0 and numbers[layout.LEFT] == 0.0:
                 counts[layout.CORNER] = min(counts[layout.CORNER] or 2, 2)
-        found = take_step(
-            numbers, counts, nodes, settings, mechanics, matrices, force, index, events, found,
-            scratch,
-        )  # fmt: skip
-        index += 1
-        if index == steps:
-            index = 0
+        found, status = take_step(
+            numbers, counts, nodes, settings, mechanics, matrices, force, events, found, scratch
+        )
+        if status != layout.FINISHED:
+            return row, found, status
+        counts[layout.STEP] += 1
+        if counts[layout.STEP] == counts[layout.STEPS]:
+            counts[layout.STEP] = 0
             xt, xw = numbers[layout.TOOL_X], numbers[layout.WORKPIECE_X]
             if not (abs(xt) <= settings[layout.LIMIT] and abs(xw) <= settings[layout.LIMIT]):
-                status = layout.GUARD
-                break
+                return row, found, layout.GUARD
             _write_present(numbers, counts, settings, out, row)
             if measured:
-                add_measurement(out, row, settings, numbers[layout.SPEED], seed)
+                speed, _ = speed_and_slope(
+                    numbers[layout.SPEED], 0.0, settings[layout.VARIATION],
+                    numbers[layout.PHASE], settings[layout.VARIATION_FREQUENCY],
+                )  # fmt: skip
+                add_measurement(out, row, settings, speed, seed)
             row += 1
-    return row, found, status

@@ -1,4 +1,4 @@
-"""Compiles the inner loop once, so that nothing waits for it later.
+"""Compiles the inner loops once, so that nothing waits for it later.
 
     python -m lathe_chatter.warm_up
 
@@ -8,12 +8,14 @@ later process until the source changes.
 
 from __future__ import annotations
 
+from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import SAMPLE_COLUMNS
 
 
 def warm_up() -> None:
-    """Take one sample, which compiles all that later ones need."""
-    VirtualLathe().advance(1)
+    """Cut a little and watch it, which compiles all that later calls need."""
+    ChatterDetector().update(VirtualLathe().advance(2000), SAMPLE_COLUMNS)
 
 
 if __name__ == '__main__':

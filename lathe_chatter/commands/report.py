@@ -8,9 +8,11 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from lathe_chatter.changes import on_the_shop_floor
 from lathe_chatter.history import History, read_history
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.pictures import draw_run
@@ -42,12 +44,11 @@ def run(options: Namespace) -> int:
 def show_run(history: History, console: Console) -> dict[str, Any]:
     """Print the table of a run, draw its picture beside it, and return the same as figures."""
     occurrences = _occurrences(history)
-    table = Table(title=None, header_style='bold', pad_edge=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
     table.add_column('time / s', justify='right')
-    table.add_column('what')
-    table.add_column('monitor', justify='right')
-    table.add_column('open machine', justify='right')
-    table.add_column('seated on its bearing', justify='right')
+    table.add_column('what happened')
+    for title in ('monitor', 'root, open', 'root, seated'):
+        table.add_column(title, justify='right', no_wrap=True)
     for entry in occurrences:
         table.add_row(
             f'{entry["time"]:.3f}',
@@ -57,8 +58,8 @@ def show_run(history: History, console: Console) -> dict[str, Any]:
         )
     console.print(table)
     console.print(
-        'Each pair is chatter frequency / Hz and growth rate / 1/s: what the monitor measured, '
-        'and the rightmost\ncharacteristic root of the linear machine, open and seated.'
+        'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and\n'
+        'as the rightmost characteristic root has them, of the machine open and on its bearing.'
     )
     picture = history.path / PICTURE
     draw_run(history, picture)
@@ -78,7 +79,7 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
     start = history.start
     result = [_entry(history, 0.0, f'start: {_cut_text(start)}')]
     for change in history.changes:
-        words = ', '.join(f'{name} {_number(value)}' for name, value in change.new.items())
+        words = ', '.join(on_the_shop_floor(*changed) for changed in change.new.items())
         result.append(_entry(history, change.time, words))
     for flag in history.flags:
         entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
@@ -112,17 +113,11 @@ def _entry(history: History, time: float, what: str) -> dict[str, Any]:
 
 def _cut_text(cut: Cut) -> str:
     """Speed, depth and bearing in the units of the shop floor."""
-    bearing = (
-        'no clearance'
-        if cut.bearing_contact is BearingContact.NONE
-        else f'clearance {cut.bearing_clearance * 1e6:g} µm ({cut.bearing_contact.value})'
-    )
-    return f'{cut.spindle_speed_rpm:g} rev/min, {cut.depth_of_cut * 1e3:g} mm, {bearing}'
-
-
-def _number(value: object) -> str:
-    """A value as a person writes it."""
-    return f'{value:g}' if isinstance(value, float) else str(getattr(value, 'value', value))
+    names = ['spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance']
+    words = [on_the_shop_floor(name, getattr(cut, name)) for name in names]
+    if cut.bearing_contact is BearingContact.NONE:
+        words[-1] = 'no clearance'
+    return ', '.join(words)
 
 
 def _known(value: float) -> float | None:

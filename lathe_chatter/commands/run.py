@@ -35,6 +35,8 @@ EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
 
 _START_PATIENCE = 30.0
 """s for the nodes to find each other."""
+_SETTLING = 0.5
+"""s in which a listener that has found the lathe gets what was kept for it."""
 _GRACE = 10.0
 """s of simulated time beyond a scenario's end for what the monitor is expected to say."""
 
@@ -115,6 +117,7 @@ def _play(scenario: Scenario, output: Path, console: Console) -> bool:
                 _follow(operator, executor, cell, scenario, console)
             except KeyboardInterrupt:
                 interrupted = True
+                _await_listeners(operator, executor)
             complaints = cell.end()
         if complaints:
             raise RunFailedError(' '.join(complaints))
@@ -140,6 +143,17 @@ def _await_nodes(operator: Operator, executor: Any, cell: Cell) -> None:
             'Another lathe is cutting in this ROS domain already: end it, or set ROS_DOMAIN_ID '
             'to another number.'
         )
+
+
+def _await_listeners(operator: Operator, executor: Any) -> None:
+    """Wait until those that listen to the lathe have found it: what it cut so far is theirs."""
+    until = time.monotonic() + _START_PATIENCE
+    settled = 0.0
+    while operator.time > 0.0 and time.monotonic() < until and settled < _SETTLING:
+        executor.spin_once(timeout_sec=0.05)
+        listeners = operator.listeners()
+        if {'run_recorder', 'chatter_monitor'} <= listeners:
+            settled += 0.05
 
 
 def _follow(

@@ -1,0 +1,57 @@
+"""Whether blocks of samples follow each other without a gap, proven from their times alone."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from lathe_chatter.model import Array
+
+
+class Joint(str, Enum):
+    """How a block of samples joins the one before."""
+
+    FIRST = 'first'
+    CONTIGUOUS = 'contiguous'
+    GAP = 'gap'
+    """Samples are missing in between."""
+    RESTART = 'restart'
+    """Simulated time has gone back: another run."""
+
+
+class Continuity:
+    """Follows the times of samples from block to block.
+
+    Attributes:
+        samples: How many came.
+        lost: How many did not, as far as the times tell.
+        gaps: In how many places.
+        restarts: How often simulated time went back.
+        last: The time of the newest sample, s; None before the first.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing known."""
+        self.samples = self.lost = self.gaps = self.restarts = 0
+        self.last: float | None = None
+        self._step = 0.0
+
+    def join(self, times: Array) -> Joint:
+        """Join a block by the times of its samples (n,), s, n > 0, evenly spaced.
+
+        A gap between the very first block of one sample and the next cannot be told.
+        """
+        before, self.last = self.last, float(times[-1])
+        self.samples += times.size
+        if times.size > 1:
+            self._step = float(times[-1] - times[0]) / (times.size - 1)
+        if before is None:
+            return Joint.FIRST
+        missing = round((float(times[0]) - before) / self._step) - 1 if self._step else 0
+        if missing < 0:
+            self.restarts += 1
+            return Joint.RESTART
+        if missing > 0:
+            self.lost += missing
+            self.gaps += 1
+            return Joint.GAP
+        return Joint.CONTIGUOUS

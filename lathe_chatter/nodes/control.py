@@ -1,0 +1,81 @@
+"""Run, pause, step and reset, as a state machine that knows nothing of ROS.
+
+          pause           step (one tick)
+RUNNING ---------> PAUSED ---------------> PAUSED
+        <---------
+          resume
+any of them -- the guard trips --> ENDED -- reset --> as it was before, RUNNING or PAUSED
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class RunState(str, Enum):
+    """Whether simulated time goes on."""
+
+    RUNNING = 'running'
+    PAUSED = 'paused'
+    ENDED = 'ended'
+    """The guard tripped: there is nothing to go on with until a reset."""
+
+
+class Answer(NamedTuple):
+    """What a request came to: whether it was carried out, and a sentence about it."""
+
+    done: bool
+    message: str
+
+
+class RunControl:
+    """The states above.
+
+    Attributes:
+        ended_because: The sentence of the guard, empty unless ENDED.
+        resets: How many there were.
+    """
+
+    def __init__(self) -> None:
+        """Begin RUNNING."""
+        self._paused = False
+        self.ended_because = ''
+        self.resets = 0
+
+    @property
+    def state(self) -> RunState:
+        """Whether simulated time goes on."""
+        if self.ended_because:
+            return RunState.ENDED
+        return RunState.PAUSED if self._paused else RunState.RUNNING
+
+    def pause(self, *, pause: bool) -> Answer:
+        """Pause or resume; asking for what is so already is no error."""
+        if self.ended_because:
+            return Answer(done=False, message=f'{self.ended_because} Only a reset helps.')
+        before, self._paused = self._paused, pause
+        word = 'paused' if pause else 'running'
+        return Answer(done=True, message=f'Already {word}.' if before == pause else f'Now {word}.')
+
+    def may_step(self) -> Answer:
+        """Whether one tick may be made by hand."""
+        if self.ended_because:
+            return Answer(done=False, message=f'{self.ended_because} Only a reset helps.')
+        if not self._paused:
+            return Answer(done=False, message='A step is possible only while paused.')
+        return Answer(done=True, message='One tick.')
+
+    def end(self, because: str) -> None:
+        """The guard tripped.
+
+        Args:
+            because: Its sentence, not empty.
+        """
+        self.ended_because = because
+
+    def reset(self) -> Answer:
+        """Start again at time zero, paused where it was paused."""
+        self.ended_because = ''
+        self.resets += 1
+        return Answer(done=True, message=f'At time zero again, {self.state.value}.')

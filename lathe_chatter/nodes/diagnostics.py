@@ -1,0 +1,82 @@
+"""`/diagnostics` as standard tools show it: a few statuses, once a second and on change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
+ERROR, STALE = DiagnosticStatus.ERROR, DiagnosticStatus.STALE
+
+
+@dataclass(frozen=True)
+class Status:
+    """One line of a diagnostics viewer.
+
+    Attributes:
+        part: Which part of the node; its full name is put before it.
+        level: OK, WARN, ERROR or STALE.
+        message: One phrase.
+        values: What stands below it, in this order.
+    """
+
+    part: str
+    level: bytes
+    message: str
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+class Diagnostics:
+    """Publishes the statuses of one node.
+
+    Args:
+        node: Whose they are; its full name tells two cells apart.
+        hardware: What they are about.
+    """
+
+    def __init__(self, node: Node, hardware: str) -> None:
+        """Create the publisher."""
+        self._node = node
+        self._name = node.get_fully_qualified_name()
+        self._hardware = self._name.rpartition('/')[0].lstrip('/')
+        self._hardware = f'{self._hardware} {hardware}'.strip()
+        self._publisher = node.create_publisher(
+            DiagnosticArray,
+            '/diagnostics',
+            QoSProfile(depth=10),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._shown: list[tuple[str, bytes, str]] = []
+
+    def publish(self, statuses: Iterable[Status]) -> None:
+        """Publish these, changed or not."""
+        statuses = list(statuses)
+        self._shown = [(s.part, s.level, s.message) for s in statuses]
+        message = DiagnosticArray(status=[self._message(status) for status in statuses])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def publish_changes(self, statuses: Iterable[Status]) -> None:
+        """Publish these if a level or a message is new."""
+        statuses = list(statuses)
+        if self._shown != [(s.part, s.level, s.message) for s in statuses]:
+            self.publish(statuses)
+
+    def _message(self, status: Status) -> Any:
+        return DiagnosticStatus(
+            level=status.level,
+            name=f'{self._name}: {status.part}',
+            message=status.message,
+            hardware_id=self._hardware,
+            values=[KeyValue(key=key, value=_text(v)) for key, v in status.values.items()],
+        )
+
+
+def _text(value: object) -> str:
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

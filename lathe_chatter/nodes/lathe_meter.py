@@ -1,0 +1,112 @@
+"""What the node `lathe` says about itself: its pace, and what it is doing to the workpiece."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.nodes.control import RunControl, RunState
+from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
+from lathe_chatter.nodes.pacing import SECOND, Durations, Pacer
+
+_MICRO = 1e-3
+"""us in a ns."""
+
+
+class _Mark(NamedTuple):
+    """Where the counters stood when the last second ended."""
+
+    ticks: int
+    overruns: int
+    lag: float
+    at: int
+
+
+class LatheMeter:
+    """Counts and times the ticks, and turns them into statuses.
+
+    Args:
+        pacer: Whose lag is reported.
+        tick: Simulated duration of a tick, ns.
+    """
+
+    def __init__(self, pacer: Pacer, tick: float) -> None:
+        """Begin at no ticks."""
+        self._pacer = pacer
+        self._tick = tick
+        self.ticks = 0
+        self._steps = Durations()
+        self._lateness = Durations()
+        self.begin_second()
+
+    def note_tick(self, duration: int, lathe: VirtualLathe) -> None:
+        """Count a tick that took `duration` ns to compute and publish."""
+        self.ticks += 1
+        self._steps.add(duration)
+        self._engaged += lathe.bearing_engaged
+        self._in_cut += lathe.tool_in_cut
+
+    def note_lateness(self, lateness: float) -> None:
+        """Note by how much a tick came late, ns."""
+        self._lateness.add(lateness)
+
+    def begin_second(self) -> None:
+        """Forget what belonged to the second that was reported."""
+        now = time.monotonic_ns()
+        self._before = _Mark(self.ticks, self._pacer.overruns, self._pacer.lag, now)
+        self._steps.clear()
+        self._lateness.clear()
+        self._engaged = self._in_cut = 0
+
+    def pace(self, control: RunControl, *, asked: float, clock: str) -> Status:
+        """The status of the pace.
+
+        Args:
+            control: Whether time goes on.
+            asked: The real-time factor asked for, 0 for as fast as possible.
+            clock: What is wrong with /clock; empty if nothing is.
+        """
+        elapsed = max(1, time.monotonic_ns() - self._before.at)
+        reached = (self.ticks - self._before.ticks) * self._tick / elapsed
+        behind = self._pacer.overruns > self._before.overruns
+        message = 'as fast as possible' if asked == 0.0 else 'keeping up'
+        if control.state is not RunState.RUNNING:
+            message = control.state.value
+        if behind:
+            message = 'behind: simulated time was given up'
+        p50, p99, largest = (q * _MICRO for q in self._steps.quantiles(0.5, 0.99, 1.0))
+        late99, latest = (q * _MICRO for q in self._lateness.quantiles(0.99, 1.0))
+        values = {
+            'real-time factor': reached,
+            'real-time factor asked for': asked,
+            'ticks': self.ticks,
+            'overruns': self._pacer.overruns,
+            'lag given up, s': self._pacer.lag / SECOND,
+            'lag given up in the last second, s': (self._pacer.lag - self._before.lag) / SECOND,
+            'step time p50, us': p50,
+            'step time p99, us': p99,
+            'step time max, us': largest,
+            'lateness p99, us': late99,
+            'lateness max, us': latest,
+        }
+        return Status('pace', WARN if behind or clock else OK, clock or message, values)
+
+    def cutting(self, control: RunControl, lathe: VirtualLathe) -> Status:
+        """The status of the cut."""
+        ticks = max(1, self.ticks - self._before.ticks)
+        cut = lathe.cut
+        values = {
+            'simulated time, s': lathe.time,
+            'bearing contact': cut.bearing_contact.value,
+            'bearing engaged, fraction of ticks': self._engaged / ticks,
+            'tool in cut, fraction of ticks': self._in_cut / ticks,
+            'guard': control.ended_because or 'not tripped',
+            'spindle speed, rev/min': cut.spindle_speed_rpm,
+            'depth of cut, m': cut.depth_of_cut,
+            'bearing clearance, m': cut.bearing_clearance,
+            'resets': control.resets,
+        }
+        if control.ended_because:
+            return Status('cut', ERROR, control.ended_because, values)
+        return Status('cut', OK, 'cutting' if cut.depth_of_cut else 'no depth of cut', values)

@@ -1,0 +1,294 @@
+"""Node `lathe`: the virtual lathe cutting in real-time ticks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
+
+from lathe_chatter.changes import change_sentence
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import Cut
+from lathe_chatter.nodes import simulation_services
+from lathe_chatter.nodes.control import Answer, RunControl, RunState
+from lathe_chatter.nodes.diagnostics import Diagnostics, Status
+from lathe_chatter.nodes.lathe_meter import LatheMeter
+from lathe_chatter.nodes.lathe_topics import LatheTopics
+from lathe_chatter.nodes.messages import nanoseconds
+from lathe_chatter.nodes.pacing import SECOND, Pacer
+from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameters import (
+    CUT_ROWS,
+    LATHE,
+    Value,
+    cut_from,
+    machine_from,
+    samples_per_tick,
+)
+from lathe_chatter.nodes.running import run_node
+from lathe_chatter.nodes.scheduling import ask_for_short_slices
+from lathe_chatter.warm_up import warm_up
+
+_BUDGET = 5_000_000
+"""ns that a node which cuts as fast as it can takes before it looks for requests."""
+_READERS_PATIENCE = 0.1
+"""s that it then waits at most for its slowest reader; in real time it waits for nobody."""
+
+
+class LatheNode(ParameterNode):
+    """Integrates a `VirtualLathe` tick by tick and publishes what it does.
+
+    A timer wakes the node at the rate of the ticks; how many ticks it then makes follows from
+    the clock: none while paused, one as a rule, several after a delay or at a real-time factor
+    above 1. Under `use_sim_time` that clock is /clock, and all of its time is cut.
+
+    Topics, services and parameters are those of the README. A parameter set takes effect
+    between two samples, all of an atomic set at the same one.
+
+    Args:
+        options: As for `rclpy.node.Node`.
+
+    Raises:
+        ParameterError: If a parameter given at the start is not allowed.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Compile the inner loop, then begin to cut."""
+        super().__init__('lathe', LATHE, **options)
+        values: Mapping[str, Any] = self.values
+        self._follows = bool(self.get_parameter('use_sim_time').value)
+        if self._follows and values['publish_clock']:
+            allowed = 'false under use_sim_time, for /clock has one owner'
+            raise ParameterError('publish_clock', 'true', '', allowed)
+        self._sample_rate: float = values['sample_rate']
+        self._samples_per_tick = samples_per_tick(self._sample_rate, values['tick_rate'])
+        warm_up()  # compiled before the first tick is due
+        self._lathe = self._new_lathe()
+        self._pending: Cut | None = None
+
+        self._control = RunControl()
+        self._stamp_of_zero = 0
+        tick = SECOND / values['tick_rate']
+        self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
+        self._free = self._factor == 0.0
+        self._meter = LatheMeter(self._pacer, tick)
+        self._topics = LatheTopics(
+            self, values['tick_rate'], publish_clock=values['publish_clock']
+        )
+        self._diagnostics = Diagnostics(self, 'virtual lathe')
+        self._create_services()
+        self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=10))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0 / values['tick_rate'], self._wake, clock=steady)
+        self.create_timer(1.0, self._report, clock=steady)
+
+    # -- time ------------------------------------------------------------------------------
+
+    @property
+    def _factor(self) -> float:
+        """Simulated seconds per second; under another's clock, its seconds."""
+        return 1.0 if self._follows else float(self.values['real_time_factor'])  # type: ignore[arg-type]  # a double
+
+    def _now(self) -> int:
+        if self._follows:
+            return int(self.get_clock().now().nanoseconds)
+        return time.monotonic_ns()
+
+    def _start_clock(self) -> None:
+        """Let simulated time go on from here; what has passed until now does not count."""
+        now = self._now()
+        self._pacer.start(now)
+        self._stamp_of_zero = 0
+        if self._follows:
+            self._stamp_of_zero = now - self._stamp()
+
+    def _stamp(self) -> int:
+        """Simulated time as stamps have it: since the start, or on the clock that is followed."""
+        since_start = nanoseconds(self._lathe.samples_taken, self._sample_rate)
+        return self._stamp_of_zero + since_start
+
+    def _wake(self) -> None:
+        """Make the ticks that are due."""
+        if self._control.state is not RunState.RUNNING:
+            return
+        now = self._now()
+        if self._follows and now == 0:
+            return  # no /clock yet
+        if self._pacer.must_start(now):
+            self._start_clock()
+        if self._free:
+            while self._now() - now < _BUDGET and self._control.state is RunState.RUNNING:
+                self._tick()
+            self._topics.wait_for_readers(_READERS_PATIENCE)
+            return
+        overruns = self._pacer.overruns
+        for _ in range(self._pacer.due(now)):
+            self._tick()
+        self._meter.note_lateness(self._pacer.lateness(now))
+        if self._pacer.overruns != overruns:
+            self.get_logger().warning(
+                f'Behind: {self._pacer.lag / SECOND:.3f} s of simulated time given up so far.',
+                throttle_duration_sec=10.0,
+            )
+            self._diagnostics.publish_changes(self._statuses())
+
+    def _tick(self) -> None:
+        """Cut one tick and publish it."""
+        if self._control.state is RunState.ENDED:
+            return
+        began = time.perf_counter_ns()
+        if self._pending is not None:
+            self._retune(self._pending)
+            self._pending = None
+        samples = self._lathe.advance(self._samples_per_tick)
+        if len(samples):
+            self._topics.publish(samples, self._stamp())
+        if self._lathe.guard:
+            self._end(self._lathe.guard)
+        self._meter.note_tick(time.perf_counter_ns() - began, self._lathe)
+
+    def _end(self, because: str) -> None:
+        self._control.end(because)
+        self.get_logger().error(because)
+        self._diagnostics.publish(self._statuses())
+
+    # -- the cut ---------------------------------------------------------------------------
+
+    def _new_lathe(self) -> VirtualLathe:
+        values: Mapping[str, Any] = self.values
+        return VirtualLathe(
+            machine_from(values),
+            cut_from(values),
+            sample_rate=values['sample_rate'],
+            tool_leaves_cut=values['tool_leaves_cut'],
+            spindle_acceleration=values['spindle_acceleration'],
+            seed=values['seed'],
+        )
+
+    def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
+        """Queue the new cut for the next tick, or take the new pace at once."""
+        if 'real_time_factor' in changed and not self._follows:
+            self._change_pace(self._factor)
+        if any(row.name in changed for row in CUT_ROWS):
+            self._pending = cut_from(self.values)
+
+    def _change_pace(self, factor: float) -> None:
+        free, self._free = self._free, factor == 0.0
+        if free or self._free:
+            self._start_clock()
+        if factor:
+            self._pacer.change(factor, self._now())
+
+    def _retune(self, cut: Cut) -> None:
+        change = change_sentence(self._lathe.time, self._lathe.cut, cut)
+        self._lathe.retune(cut)
+        if change:
+            self.get_logger().info(change)
+
+    def _on_knock(self, message: Float64) -> None:
+        try:
+            self._lathe.knock(message.data)
+        except ParameterError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+        else:
+            self.get_logger().info(f'At {self._lathe.time:.6f} s: knock of {message.data:g} N s.')
+
+    # -- control ---------------------------------------------------------------------------
+
+    @property
+    def run_state(self) -> RunState:
+        """Whether simulated time goes on."""
+        return self._control.state
+
+    @property
+    def samples_taken(self) -> int:
+        """Samples since the start or the last reset."""
+        return self._lathe.samples_taken
+
+    def pause(self, *, pause: bool) -> Answer:
+        """Pause, or go on from where it was paused with nothing to catch up."""
+        before = self._control.state
+        answer = self._control.pause(pause=pause)
+        if self._control.state is not before:
+            self._start_clock()
+        return self._told(answer)
+
+    def step(self, ticks: int = 1) -> Answer:
+        """Make ticks by hand, while paused; fewer if the guard trips."""
+        answer = self._control.may_step()
+        if answer.done:
+            for _ in range(ticks):
+                self._tick()
+            answer = Answer(done=True, message=f'Now at {self._lathe.time:.6f} s.')
+        return self._told(answer)
+
+    def reset(self) -> Answer:
+        """Start again at time zero with the present parameters: the same run, bit for bit."""
+        answer = self._control.reset()
+        self._pending = None
+        self._lathe = self._new_lathe()
+        self._start_clock()
+        self.get_logger().info(answer.message)
+        return self._told(answer)
+
+    def _told(self, answer: Answer) -> Answer:
+        self._diagnostics.publish_changes(self._statuses())
+        return answer
+
+    def _create_services(self) -> None:
+        def pause(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+            response.success, response.message = self.pause(pause=request.data)
+            return response
+
+        def step(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = self.step()
+            return response
+
+        def reset(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = self.reset()
+            return response
+
+        self.create_service(SetBool, '~/pause', pause)
+        self.create_service(Trigger, '~/step', step)
+        self.create_service(Trigger, '~/reset', reset)
+        if simulation_services.AVAILABLE:
+            simulation_services.offer(self)
+
+    # -- diagnostics -----------------------------------------------------------------------
+
+    def _report(self) -> None:
+        self._diagnostics.publish(self._statuses())
+        self._meter.begin_second()
+        if self._control.state is not RunState.RUNNING:
+            self._topics.publish_clock(self._stamp())  # for those that join a clock at rest
+
+    def _statuses(self) -> list[Status]:
+        return [
+            self._meter.pace(self._control, asked=self._factor, clock=self._clock_complaint()),
+            self._meter.cutting(self._control, self._lathe),
+        ]
+
+    def _clock_complaint(self) -> str:
+        """What is wrong with /clock, where this node drives or follows it."""
+        owners = self.count_publishers('/clock')
+        if self._follows and not owners:
+            return 'waiting for /clock'
+        if (self._follows or self.values['publish_clock']) and owners > 1:
+            return f'{owners} nodes publish /clock: it must have one owner'
+        return ''
+
+
+def main() -> None:
+    """Run the node until it is told to end."""
+    ask_for_short_slices()
+    run_node(LatheNode)
+
+
+if __name__ == '__main__':
+    main()

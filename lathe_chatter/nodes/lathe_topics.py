@@ -1,0 +1,102 @@
+"""The topics of the node `lathe`: what goes out after each tick."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray
+
+from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.nodes.messages import joint_states, refill, samples_to_message, time_message
+
+_SCALARS = {
+    '~/tool/displacement': SAMPLE_COLUMNS.index('tool_displacement'),
+    '~/tool/velocity': SAMPLE_COLUMNS.index('tool_velocity'),
+    '~/workpiece/displacement': SAMPLE_COLUMNS.index('workpiece_displacement'),
+    '~/workpiece/velocity': SAMPLE_COLUMNS.index('workpiece_velocity'),
+}
+_HISTORY = 4.0
+"""Seconds of ticks that a reader may fall behind before it misses one."""
+_LOOK_AROUND = 0.01
+"""s after which a new listener is noticed."""
+
+
+class LatheTopics:
+    """Publishers of the state, the samples, the joints and the clock.
+
+    Nothing waits for a subscriber. The samples are kept for one that joins late and asks for
+    them (transient local), so that a record has the first one; the rest costs nothing while
+    nobody listens.
+
+    Args:
+        node: That they belong to.
+        tick_rate: Messages a simulated second, Hz.
+        publish_clock: Whether /clock is among them.
+    """
+
+    def __init__(self, node: Node, tick_rate: float, *, publish_clock: bool) -> None:
+        """Create the publishers."""
+
+        def publisher(kind: Any, topic: str, qos: QoSProfile) -> Publisher:
+            options = QoSOverridingOptions.with_default_policies()
+            return node.create_publisher(kind, topic, qos, qos_overriding_options=options)
+
+        deep = max(10, round(_HISTORY * tick_rate))
+        kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._samples = publisher(Float64MultiArray, '~/samples', kept)
+        self._block, self._rows = Float64MultiArray(), 0
+        self._scalars = [
+            (publisher(Float64, topic, QoSProfile(depth=deep)), Float64(), column)
+            for topic, column in _SCALARS.items()
+        ]
+        self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
+        self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
+        self._looked_around = -_LOOK_AROUND
+        self._heard_scalars: list[tuple[Publisher, Float64, int]] = []
+        self._heard_joints = False
+
+    def publish(self, samples: Array, stamp: int) -> None:
+        """Publish what one tick brought, the state before the clock.
+
+        Args:
+            samples: (n, 8), n > 0.
+            stamp: Simulated time of the last, ns.
+        """
+        if len(samples) == self._rows:  # as always but at the end of a run
+            refill(self._block, samples)
+        else:
+            self._block, self._rows = samples_to_message(samples), len(samples)
+        self._samples.publish(self._block)
+        self._look_around()
+        last = samples[-1]
+        for publisher, message, column in self._heard_scalars:
+            message.data = float(last[column])
+            publisher.publish(message)
+        if self._heard_joints:
+            self._joints.publish(joint_states(last, stamp))
+        self.publish_clock(stamp)
+
+    def _look_around(self) -> None:
+        """See from time to time who listens: to ask at each tick costs as much as a sample."""
+        now = time.monotonic()
+        if now - self._looked_around >= _LOOK_AROUND:
+            self._looked_around = now
+            self._heard_scalars = [s for s in self._scalars if s[0].get_subscription_count()]
+            self._heard_joints = self._joints.get_subscription_count() > 0
+
+    def wait_for_readers(self, patience: float) -> None:
+        """Wait until every reader has the samples, `patience` s at most."""
+        self._samples.wait_for_all_acked(Duration(seconds=patience))
+
+    def publish_clock(self, stamp: int) -> None:
+        """Publish simulated time, ns, if this node drives the clock."""
+        if self._clock is not None:
+            self._clock.publish(Clock(clock=time_message(stamp)))

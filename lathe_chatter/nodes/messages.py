@@ -1,0 +1,111 @@
+"""Arrays to messages and back, as the contract has them; pure functions.
+
+A block of samples is a `Float64MultiArray`, row-major: `dim[0]` counts the samples and `dim[1]`
+has the names of the columns, joined by commas, as its label. Readers find columns by name.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from lathe_chatter.errors import LayoutError
+from lathe_chatter.model import SAMPLE_COLUMNS, Array
+
+_SECOND = 10**9
+_TOOL, _WORKPIECE = 2, 4
+_FORCE = SAMPLE_COLUMNS.index('cutting_force')
+
+
+def samples_to_message(
+    samples: Array, columns: Sequence[str] = SAMPLE_COLUMNS
+) -> Float64MultiArray:
+    """A block of samples as a message.
+
+    Args:
+        samples: (n, k), float64.
+        columns: The k names.
+
+    Raises:
+        LayoutError: If names and columns do not match.
+    """
+    rows, width = samples.shape
+    if width != len(columns):
+        raise LayoutError(f'{width} columns of samples have {len(columns)} names.')
+    layout = MultiArrayLayout(
+        dim=[
+            MultiArrayDimension(label='sample', size=rows, stride=rows * width),
+            MultiArrayDimension(label=','.join(columns), size=width, stride=width),
+        ]
+    )
+    message = Float64MultiArray(layout=layout)
+    refill(message, samples)
+    return message
+
+
+def refill(message: Float64MultiArray, samples: Array) -> None:
+    """Put another block of the same shape (n, k) into a message."""
+    # An array.array is taken as it is; a NumPy array would be checked value by value.
+    message.data = array('d', samples.tobytes())
+
+
+def samples_from_message(message: Float64MultiArray) -> tuple[Array, tuple[str, ...]]:
+    """The block of samples in a message, without a copy, and the names of its columns.
+
+    Returns:
+        The samples (n, k), read-only in the sense that they are the message's, and k names.
+
+    Raises:
+        LayoutError: If the layout is not that of the contract, or does not fit the data.
+    """
+    dim = message.layout.dim
+    if len(dim) != 2:
+        raise LayoutError(f'A block of samples has 2 dimensions, not {len(dim)}.')
+    rows, width = dim[0].size, dim[1].size
+    columns = tuple(dim[1].label.split(','))
+    if len(columns) != width:
+        raise LayoutError(f'The label {dim[1].label!r} does not name {width} columns.')
+    offset, stored = message.layout.data_offset, len(message.data)
+    if offset + rows * width != stored or dim[1].stride != width:
+        raise LayoutError(
+            f'{rows} samples of {width} columns after an offset of {offset} '
+            f'do not make {stored} numbers.'
+        )
+    return np.frombuffer(message.data, float)[offset:].reshape(rows, width), columns
+
+
+def nanoseconds(samples_taken: int, sample_rate: float) -> int:
+    """Simulated time after a number of samples in whole nanoseconds, rounded once, exactly."""
+    rate, per = sample_rate.as_integer_ratio()
+    return (2 * samples_taken * per * _SECOND + rate) // (2 * rate)
+
+
+def time_message(stamp: int) -> Time:
+    """A time given in nanoseconds."""
+    seconds, rest = divmod(stamp, _SECOND)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def joint_states(sample: Array, stamp: int) -> JointState:
+    """One sample as two prismatic joints.
+
+    Args:
+        sample: (8,), columns as in `model.SAMPLE_COLUMNS`.
+        stamp: Simulated time, ns.
+
+    Returns:
+        Position m, velocity m/s, and effort N: the cutting force, which pushes the tool back
+        and the workpiece on, equations (8a) and (8b).
+    """
+    message = JointState(name=['tool', 'workpiece'])
+    message.header.stamp = time_message(stamp)
+    force = float(sample[_FORCE])
+    message.position = [float(sample[_TOOL]), float(sample[_WORKPIECE])]
+    message.velocity = [float(sample[_TOOL + 1]), float(sample[_WORKPIECE + 1])]
+    message.effort = [-force, force]
+    return message

@@ -1,0 +1,225 @@
+"""Node `chatter_monitor`: listens to the samples of a lathe and flags chatter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import Bool, Float64, Float64MultiArray, String
+
+from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.errors import LatheChatterError, LayoutError
+from lathe_chatter.model import Array
+from lathe_chatter.nodes.continuity import Continuity, Joint
+from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.messages import samples_from_message
+from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameters import MONITOR, machine_from
+from lathe_chatter.nodes.running import run_node
+from lathe_chatter.warm_up import warm_up
+
+_BACKLOG = 2000
+"""Blocks of samples that may wait for the monitor: 4 s of a lathe of 500 ticks a second."""
+_REPORT_PERIOD = 0.02
+"""Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
+_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
+_UNKNOWN = 'unknown'
+
+
+class MonitorNode(ParameterNode):
+    """Feeds the samples of `lathe/samples` to a `ChatterDetector` and publishes what it says.
+
+    It knows the machine as an impact test would tell it, and nothing of the cut but the
+    samples. Columns are found by their labels. A figure that is not known is not published.
+    Where no samples come the state is unknown, and the flag stays as it was.
+
+    Args:
+        options: As for `rclpy.node.Node`.
+
+    Raises:
+        ParameterError: If a parameter given at the start is not allowed.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Begin with the flag down and nothing known."""
+        super().__init__('chatter_monitor', MONITOR, **options)
+        warm_up()  # compiled before the first sample comes
+        self._detector = self._new_detector()
+        self._continuity = Continuity()
+        self._complaint = ''
+        self._state, self._flag = _UNKNOWN, False
+        self._figures: Mapping[str, float] = {}
+        self._next_report = -math.inf
+        self._counted = _Counted(0, 0)
+
+        self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
+        self._state_publisher = self._publisher(String, 'state', _LATCHED)
+        self._figure_publishers = {
+            name: self._publisher(Float64, name, QoSProfile(depth=10)) for name in _FIGURES
+        }
+        self._diagnostics = Diagnostics(self, 'chatter monitor')
+        self._flag_publisher.publish(Bool(data=self._flag))
+        self._state_publisher.publish(String(data=self._state))
+        self.create_subscription(
+            Float64MultiArray,
+            'lathe/samples',
+            self._on_samples,
+            QoSProfile(depth=_BACKLOG),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    # -- listening -------------------------------------------------------------------------
+
+    def _on_samples(self, message: Float64MultiArray) -> None:
+        try:
+            samples, columns = samples_from_message(message)
+            if not len(samples):
+                return
+            self._follow(_times(samples, columns))
+            estimate = self._detector.update(samples, columns)
+        except LatheChatterError as error:
+            self._complaint = str(error)
+            self.get_logger().error(self._complaint, throttle_duration_sec=10.0)
+            return
+        self._complaint = ''
+        self._tell(estimate)
+
+    def _follow(self, times: Array) -> None:
+        """Notice lost samples and a lathe that has started again."""
+        before = self._continuity.last
+        joint = self._continuity.join(times)
+        if joint is Joint.FIRST:
+            self.get_logger().info(f'Listening from {times[0]:.6f} s on.')
+        elif joint is Joint.RESTART:
+            self.get_logger().info(f'At {before:.6f} s: the lathe started again; so do I.')
+            self._detector = self._new_detector()
+            self._next_report = -math.inf
+        elif joint is Joint.GAP:
+            self.get_logger().warning(
+                f'At {before:.6f} s: the samples up to {times[0]:.6f} s did not come.'
+            )
+
+    def _new_detector(self) -> ChatterDetector:
+        return ChatterDetector(machine_from(self.values))
+
+    # -- telling ---------------------------------------------------------------------------
+
+    def _tell(self, estimate: Estimate) -> None:
+        """Publish what is new, the figures before the flag that they explain."""
+        changed = estimate.state != self._state or estimate.chatter != self._flag
+        if changed or estimate.time >= self._next_report:
+            self._next_report = estimate.time + _REPORT_PERIOD
+            self._publish_figures(estimate)
+        if estimate.state != self._state:
+            self._state = estimate.state
+            self._state_publisher.publish(String(data=self._state))
+        if estimate.chatter != self._flag:
+            self._flag = estimate.chatter
+            self._flag_publisher.publish(Bool(data=self._flag))
+            # Two calls: rclpy allows each place in the code one severity.
+            if self._flag:
+                self.get_logger().warning(_onset(estimate))
+            else:
+                self.get_logger().info(_clearance(estimate))
+        if changed:
+            self._diagnostics.publish_changes(self._statuses())
+
+    def _publish_figures(self, estimate: Estimate) -> None:
+        figures = {name: float(getattr(estimate, name)) for name in _FIGURES}
+        self._figures = {name: value for name, value in figures.items() if math.isfinite(value)}
+        for name, value in self._figures.items():
+            self._figure_publishers[name].publish(Float64(data=value))
+
+    def _publisher(self, kind: Any, name: str, qos: QoSProfile) -> Publisher:
+        options = QoSOverridingOptions.with_default_policies()
+        return self.create_publisher(kind, f'~/{name}', qos, qos_overriding_options=options)
+
+    # -- diagnostics -----------------------------------------------------------------------
+
+    def _report(self) -> None:
+        """Once a second; a second without samples means that nothing is known any more."""
+        silent = self._continuity.samples == self._counted.samples
+        if silent and self._state != _UNKNOWN:
+            self._state = _UNKNOWN
+            self._state_publisher.publish(String(data=self._state))
+        self._diagnostics.publish(self._statuses(silent=silent))
+        self._counted = _Counted(self._continuity.samples, self._continuity.lost)
+
+    def _statuses(self, *, silent: bool = False) -> list[Status]:
+        cut = {'state': self._state, 'flag': self._flag, **self._figures}
+        return [
+            self._samples_status(silent=silent),
+            Status('cut', _LEVELS.get(self._state, OK), self._state, cut),
+        ]
+
+    def _samples_status(self, *, silent: bool) -> Status:
+        heard = self._continuity
+        values = {
+            'samples': heard.samples,
+            'samples lost': heard.lost,
+            'gaps': heard.gaps,
+            'restarts of the lathe': heard.restarts,
+            'simulated time, s': heard.last if heard.last is not None else 'none yet',
+        }
+        if self._complaint:
+            return Status('samples', ERROR, self._complaint, values)
+        if silent:
+            return Status('samples', WARN, 'no samples come', values)
+        if heard.lost > self._counted.lost:
+            return Status('samples', WARN, 'samples were lost', values)
+        return Status('samples', OK, 'all samples came', values)
+
+
+class _Counted(NamedTuple):
+    """Where the counters stood at the last report."""
+
+    samples: int
+    lost: int
+
+
+def _times(samples: Array, columns: Sequence[str]) -> Array:
+    """The times of the samples (n,), s.
+
+    Raises:
+        LayoutError: If there are none, if they do not increase, or if a sample is no number.
+    """
+    if 'time' not in columns:
+        raise LayoutError(f'The samples have no column time, only {", ".join(columns)}.')
+    times: Array = samples[:, columns.index('time')]
+    if not np.isfinite(samples).all() or (np.diff(times) <= 0.0).any():
+        raise LayoutError('The samples are not finite, or their times do not increase.')
+    return times
+
+
+def _onset(estimate: Estimate) -> str:
+    """What a machinist has to know, as far as it is known."""
+    known = [
+        (estimate.frequency, f'at {estimate.frequency:.1f} Hz'),
+        (estimate.growth_rate, f'growing at {estimate.growth_rate:.1f} 1/s'),
+        (estimate.amplitude, f'amplitude {estimate.amplitude * 1e6:.3g} um'),
+        (estimate.recommended_speed_rpm, f'try {estimate.recommended_speed_rpm:.0f} rev/min'),
+    ]
+    words = ', '.join(text for value, text in known if math.isfinite(value))
+    return f'At {estimate.time:.6f} s: chatter {words}.'
+
+
+def _clearance(estimate: Estimate) -> str:
+    return f'At {estimate.time:.6f} s: the chatter has died out; the cut is {estimate.state}.'
+
+
+def main() -> None:
+    """Run the node until it is told to end."""
+    run_node(MonitorNode)
+
+
+if __name__ == '__main__':
+    main()

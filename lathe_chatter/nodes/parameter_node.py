@@ -1,0 +1,154 @@
+"""A node whose parameters are a table: declared, refused with a sentence, and followed as one.
+
+The three callbacks of rclpy have one role each: pre-set rewrites (a whole number becomes a
+double), on-set validates without side effects, post-set hands over what was accepted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rcl_interfaces.msg import ParameterType, SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.nodes.parameters import ParameterTable, Value
+
+_OF_RCLPY = ('use_sim_time', 'start_type_description_service')
+_OF_QOS = 'qos_overrides.'
+_SET_SERVICES = (SetParameters, SetParametersAtomically)
+
+
+class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type information
+    """A node with a table of parameters.
+
+    Args:
+        name: Of the node, before remapping.
+        table: Its parameters.
+        options: As for `rclpy.node.Node`.
+
+    Raises:
+        ParameterError: If an override is not allowed; the sentence names it.
+    """
+
+    def __init__(self, name: str, table: ParameterTable, **options: Any) -> None:
+        """Declare every row with its override, or else its default."""
+        # rclpy's own declaration would end a wrong override in a traceback that says neither
+        # unit nor limits. Declared from the overrides first, without type or range, they can be
+        # read, checked by the table, and declared again as the table has them.
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
+        self._table = table
+        self._values = table.complete(self._take_overrides())
+        for row in table:
+            value = self._values[row.name]
+            self.declare_parameter(row.name, value, row.descriptor(), ignore_override=True)
+        self.add_pre_set_parameters_callback(self._with_whole_numbers)
+        self.add_on_set_parameters_callback(self._validate)
+        self.add_post_set_parameters_callback(self._accept)
+
+    @property
+    def values(self) -> Mapping[str, Value]:
+        """The present value of every parameter of the table."""
+        return self._values
+
+    def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
+        """Follow a set that was accepted; `values` has it already. Does nothing by itself.
+
+        Args:
+            changed: What the set named, all of one atomic set in one call.
+        """
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set all or nothing; rclpy's services for one and for several come through here.
+
+        rclpy refuses a wrong type, a wrong range, a read-only and an undeclared name before it
+        asks any callback, in words that lack the name or the unit: refused here, they have a
+        sentence of ours.
+        """
+        refusal = self._refusal(parameter_list)
+        if refusal:
+            return SetParametersResult(successful=False, reason=refusal)
+        return super().set_parameters_atomically(parameter_list)
+
+    def create_service(
+        self, srv_type: Any, srv_name: str, callback: Callable[..., Any], **options: Any
+    ) -> Any:
+        """Create a service; those that set parameters survive a type that ROS does not know.
+
+        rclpy raises ValueError on it inside the callback, which would end the node. Without a
+        value it is refused as any other wrong value.
+        """
+        if srv_type in _SET_SERVICES:
+            callback = _without_unknown_types(callback)
+        return super().create_service(srv_type, srv_name, callback, **options)
+
+    def _take_overrides(self) -> dict[str, object]:
+        """Undeclare everything that the overrides declared, and return it."""
+        overrides = self.get_parameters_by_prefix('')
+        if not isinstance(overrides['use_sim_time'].value, bool):
+            value = overrides['use_sim_time'].value
+            raise ParameterError('use_sim_time', value, '', 'true or false')
+        for name in _OF_RCLPY:
+            overrides.pop(name, None)
+        for name in overrides:
+            self.undeclare_parameter(name)
+            if name not in self._table and not name.startswith(_OF_QOS):
+                self.get_logger().warning(self._table.unknown(name))
+        return {name: parameter.value for name, parameter in overrides.items()}
+
+    def _with_whole_numbers(self, parameters: list[Parameter]) -> list[Parameter]:
+        return [
+            Parameter(p.name, value=float(p.value))
+            if p.type_ == Parameter.Type.INTEGER and self._is_double(p.name)
+            else p
+            for p in parameters
+        ]
+
+    def _is_double(self, name: str) -> bool:
+        return name in self._table and isinstance(self._table[name].default, float)
+
+    def _refusal(self, parameters: list[Parameter]) -> str:
+        """Why a set would be refused, as a sentence; empty where it is accepted."""
+        for parameter in parameters:
+            name = parameter.name
+            if name in _OF_RCLPY:
+                return f'{name} can be given at the start only.'
+            if name not in self._table:
+                if self.has_parameter(name):
+                    continue  # rclpy's own, and for rclpy to judge
+                return self._table.unknown(name)
+            row = self._table[name]
+            if not row.run_time:
+                return f'{name} can be given at the start only.'
+            try:
+                row.check(parameter.value)
+            except ParameterError as error:
+                return str(error)
+        return ''
+
+    def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
+        refusal = self._refusal([p for p in parameters if p.name in self._table])
+        return SetParametersResult(successful=not refusal, reason=refusal)
+
+    def _accept(self, parameters: list[Parameter]) -> None:
+        changed = {
+            p.name: self._table[p.name].check(p.value) for p in parameters if p.name in self._table
+        }
+        if changed:
+            self._values = {**self._values, **changed}
+            self.parameters_accepted(changed)
+
+
+def _without_unknown_types(callback: Callable[..., Any]) -> Callable[..., Any]:
+    known = {kind.value for kind in Parameter.Type}
+
+    def answer(request: Any, response: Any) -> Any:
+        for parameter in request.parameters:
+            if parameter.value.type not in known:
+                parameter.value.type = ParameterType.PARAMETER_NOT_SET
+        return callback(request, response)
+
+    return answer

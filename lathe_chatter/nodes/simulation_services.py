@@ -1,0 +1,140 @@
+"""The standard simulation services, where the package simulation_interfaces is installed.
+
+They are the same requests as `~/pause`, `~/step` and `~/reset` in the words that tools for any
+simulator know. STOPPED is paused at time zero; a run that its guard has ended reads as paused.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from lathe_chatter.nodes.control import Answer, RunState
+
+try:
+    from simulation_interfaces.msg import Result, SimulationState, SimulatorFeatures
+    from simulation_interfaces.srv import (
+        GetSimulationState,
+        GetSimulatorFeatures,
+        ResetSimulation,
+        SetSimulationState,
+        StepSimulation,
+    )
+except ImportError:
+    AVAILABLE = False
+else:
+    AVAILABLE = True
+
+_MOST_STEPS = 100_000
+"""Ticks in one request: more would leave other requests unanswered for too long."""
+
+
+class Simulator(Protocol):
+    """What the services drive; a node of rclpy beside."""
+
+    @property
+    def run_state(self) -> RunState:
+        """Whether simulated time goes on."""
+
+    @property
+    def samples_taken(self) -> int:
+        """0 at time zero."""
+
+    def pause(self, *, pause: bool) -> Answer:
+        """Pause or go on."""
+
+    def step(self, ticks: int = 1) -> Answer:
+        """Make ticks while paused."""
+
+    def reset(self) -> Answer:
+        """Start again at time zero."""
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
+        """Create a service."""
+
+
+def offer(simulator: Simulator) -> None:
+    """Create the services on a node."""
+    services = _Services(simulator)
+    simulator.create_service(
+        GetSimulatorFeatures, '~/get_simulator_features', services.get_features
+    )
+    simulator.create_service(GetSimulationState, '~/get_simulation_state', services.get_state)
+    simulator.create_service(SetSimulationState, '~/set_simulation_state', services.set_state)
+    simulator.create_service(StepSimulation, '~/step_simulation', services.step)
+    simulator.create_service(ResetSimulation, '~/reset_simulation', services.reset)
+
+
+class _Services:
+    """The callbacks."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._simulator = simulator
+
+    def get_features(self, _request: Any, response: Any) -> Any:
+        """What of the standard is supported."""
+        known = SimulatorFeatures
+        response.features.features = [
+            known.SIMULATION_RESET,
+            known.SIMULATION_STATE_GETTING,
+            known.SIMULATION_STATE_SETTING,
+            known.SIMULATION_STATE_PAUSE,
+            known.STEP_SIMULATION_SINGLE,
+            known.STEP_SIMULATION_MULTIPLE,
+        ]
+        return response
+
+    def get_state(self, _request: Any, response: Any) -> Any:
+        """PLAYING, PAUSED or STOPPED."""
+        response.state.state = self._state()
+        response.result.result = Result.RESULT_OK
+        return response
+
+    def set_state(self, request: Any, response: Any) -> Any:
+        """Play, pause or stop."""
+        wanted, result = request.state.state, response.result
+        if wanted == self._state():
+            result.result = SetSimulationState.Response.ALREADY_IN_TARGET_STATE
+            return response
+        if wanted == SimulationState.STATE_STOPPED:
+            self._simulator.reset()
+            answer = self._simulator.pause(pause=True)
+        elif wanted in {SimulationState.STATE_PLAYING, SimulationState.STATE_PAUSED}:
+            answer = self._simulator.pause(pause=wanted == SimulationState.STATE_PAUSED)
+        else:
+            result.result = Result.RESULT_FEATURE_UNSUPPORTED
+            result.error_message = 'A lathe can be playing, paused or stopped.'
+            return response
+        failed = SetSimulationState.Response.STATE_TRANSITION_ERROR
+        _report(result, answer, failed)
+        return response
+
+    def step(self, request: Any, response: Any) -> Any:
+        """Make ticks while paused."""
+        result = response.result
+        if request.steps > _MOST_STEPS:
+            result.result = Result.RESULT_OPERATION_FAILED
+            result.error_message = f'At most {_MOST_STEPS} ticks in one request.'
+            return response
+        _report(result, self._simulator.step(request.steps), Result.RESULT_INCORRECT_STATE)
+        return response
+
+    def reset(self, request: Any, response: Any) -> Any:
+        """Time and state at once, for neither makes sense alone."""
+        both = ResetSimulation.Request.SCOPE_TIME | ResetSimulation.Request.SCOPE_STATE
+        if request.scope == ResetSimulation.Request.SCOPE_DEFAULT or request.scope & both == both:
+            _report(response.result, self._simulator.reset(), Result.RESULT_OPERATION_FAILED)
+        else:
+            response.result.result = Result.RESULT_FEATURE_UNSUPPORTED
+            response.result.error_message = 'Time and state of a lathe are reset together.'
+        return response
+
+    def _state(self) -> int:
+        if self._simulator.run_state is RunState.RUNNING:
+            return int(SimulationState.STATE_PLAYING)
+        at_zero = self._simulator.samples_taken == 0
+        return int(SimulationState.STATE_STOPPED if at_zero else SimulationState.STATE_PAUSED)
+
+
+def _report(result: Any, answer: Answer, failed: int) -> None:
+    result.result = Result.RESULT_OK if answer.done else failed
+    result.error_message = '' if answer.done else answer.message

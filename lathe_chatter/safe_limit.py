@@ -1,0 +1,139 @@
+"""The depth that is safe with a bearing clearance: open limit, seated limit and seating line.
+
+The mean cutting force C w f pushes the workpiece by C w f / k_wp. As long as that is less than
+the clearance gamma the workpiece floats and the open limit holds; from the seating line
+
+    w = k_wp gamma / (C f)
+
+on it rests on its bearing and the seated limit holds, which may be lower or higher. This judges
+small disturbances: a hard knock can drive a floating workpiece against its bearing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lathe_chatter.characteristic import checked
+from lathe_chatter.lobes import critical_depth, critical_depths
+from lathe_chatter.model import Array, BearingContact, Cut, Machine
+from lathe_chatter.quantities import Quantity
+
+_CLEARANCE = Quantity('bearing clearance gamma', 'm')
+_FEED = Quantity('feed per revolution f', 'm')
+
+
+@dataclass(frozen=True)
+class SafeLimit:
+    """The limits of depth at some spindle speeds; all arrays have one shape.
+
+    Attributes:
+        spindle_speed_rpm: rev/min.
+        depth_of_cut: Every smaller depth is stable, m.
+        open_limit: Critical depth while the workpiece floats, m.
+        seated_limit: Critical depth while it rests on its bearing, m.
+        seating_line: Depth from which on it rests, m; infinite where it never does.
+    """
+
+    spindle_speed_rpm: Array
+    depth_of_cut: Array
+    open_limit: Array
+    seated_limit: Array
+    seating_line: Array
+
+
+class ContactAt(NamedTuple):
+    """What a cut is at its mean force: whether the workpiece is seated, and the limit then.
+
+    Attributes:
+        seated: Whether the workpiece rests on its bearing.
+        limit: The critical depth in this regime, m.
+        stable: Whether the depth of the cut is below it.
+    """
+
+    seated: bool
+    limit: float
+    stable: bool
+
+
+def seating_depth(machine: Machine, bearing_clearance: float, feed: float) -> float:
+    """The seating line w = k_wp gamma / (C f): from here on the mean force closes the clearance.
+
+    Beyond it the workpiece rests on its bearing and the seated limit holds.
+
+    Args:
+        machine: Workpiece and material.
+        bearing_clearance: gamma, m.
+        feed: f per revolution, m.
+
+    Returns:
+        The depth of cut, m; infinite without feed or force.
+
+    Raises:
+        ParameterError: If clearance or feed is negative or not finite.
+    """
+    clearance = _CLEARANCE.check('bearing_clearance', bearing_clearance)
+    force_per_depth = machine.cutting_coefficient * _FEED.check('feed', feed)
+    if force_per_depth == 0.0:
+        return math.inf
+    return machine.workpiece.stiffness * clearance / force_per_depth
+
+
+def safe_limit(
+    machine: Machine,
+    cut: Cut,
+    spindle_speed_rpm: ArrayLike | None = None,
+    *,
+    tool_leaves_cut: bool = True,
+) -> SafeLimit:
+    """The edge of the safe region at the clearance and feed speed of a cut.
+
+    Args:
+        machine: Tool, workpiece, bearing and material.
+        cut: Clearance, contact, feed speed; its own speed where none are given.
+        spindle_speed_rpm: Speeds of any shape, rev/min. The feed per revolution falls with them.
+        tool_leaves_cut: Whether the force has a mean; the paper's linear force has none, and
+            a workpiece that moves little then floats at any depth.
+
+    Returns:
+        The limits at each speed.
+
+    Raises:
+        ParameterError: If a speed is not allowed.
+    """
+    given = cut.spindle_speed_rpm if spindle_speed_rpm is None else spindle_speed_rpm
+    speeds = checked('spindle_speed_rpm', given)
+    floating = critical_depths(machine, speeds, seated=False)
+    seated = critical_depths(machine, speeds, seated=True)
+    line = np.full(speeds.shape, math.inf)
+    if cut.bearing_contact is BearingContact.SEATED:
+        line = np.zeros(speeds.shape)
+    elif cut.bearing_contact is BearingContact.GAP and tool_leaves_cut:
+        # The line is inverse to the feed, which is inverse to the speed.
+        at_one = seating_depth(machine, cut.bearing_clearance, 60.0 * cut.feed_speed)
+        line = at_one * speeds
+    depth = np.where(floating <= line, floating, np.maximum(line, seated))
+    return SafeLimit(speeds, depth, floating, seated, line)
+
+
+def contact_at(machine: Machine, cut: Cut, *, tool_leaves_cut: bool = True) -> ContactAt:
+    """Which of the two limits holds for a cut as it is, and whether the cut keeps it.
+
+    Args:
+        machine: Tool, workpiece, bearing and material.
+        cut: The operating point.
+        tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
+
+    Returns:
+        The contact at the mean force, the critical depth in that contact, and the verdict for
+        small disturbances.
+    """
+    seated = cut.bearing_contact is BearingContact.SEATED
+    if cut.bearing_contact is BearingContact.GAP and tool_leaves_cut:
+        seated = cut.depth_of_cut >= seating_depth(machine, cut.bearing_clearance, cut.feed)
+    limit = critical_depth(machine, cut.spindle_speed_rpm, seated=seated)
+    return ContactAt(seated, limit, cut.depth_of_cut < limit)

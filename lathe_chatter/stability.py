@@ -1,0 +1,54 @@
+"""Stability of a cut: growth rates, limits, lobes and advice, one import for all of them.
+
+`roots` finds and proves characteristic roots, `lobes` holds what is known in closed form,
+`safe_limit` adds the bearing clearance, `speed_variation` the periodic spindle, and `advice`
+turns roots and lobes into a spindle speed. None needs more than NumPy.
+"""
+
+from __future__ import annotations
+
+from lathe_chatter.advice import (
+    CuttingAdvice,
+    SpeedAdvice,
+    recommend_speeds,
+    stable_speed_intervals,
+)
+from lathe_chatter.lobes import (
+    LobeBoundary,
+    critical_depth,
+    critical_depths,
+    lobe_boundary,
+)
+from lathe_chatter.root_count import count_roots_right_of
+from lathe_chatter.roots import leading_roots, rightmost_root, rightmost_roots
+from lathe_chatter.safe_limit import ContactAt, SafeLimit, contact_at, safe_limit, seating_depth
+from lathe_chatter.speed_variation import (
+    Floquet,
+    dominant_eigenvalue,
+    floquet,
+    varied_growth_rates,
+)
+
+__all__ = [
+    'ContactAt',
+    'CuttingAdvice',
+    'Floquet',
+    'LobeBoundary',
+    'SafeLimit',
+    'SpeedAdvice',
+    'contact_at',
+    'count_roots_right_of',
+    'critical_depth',
+    'critical_depths',
+    'dominant_eigenvalue',
+    'floquet',
+    'leading_roots',
+    'lobe_boundary',
+    'recommend_speeds',
+    'rightmost_root',
+    'rightmost_roots',
+    'safe_limit',
+    'seating_depth',
+    'stable_speed_intervals',
+    'varied_growth_rates',
+]

@@ -1,0 +1,142 @@
+"""The main job, end to end: real processes over real DDS, and the record that they leave."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not there')
+pytest.importorskip('domain_coordinator', reason='domain_coordinator is not there')
+from domain_coordinator import domain_id
+
+PACE = 2.0
+"""Simulated seconds a second: the test need not take as long as the cut."""
+SHORT = f"""
+name: short
+duration: 3.0
+parameters: {{real_time_factor: {PACE}, depth_of_cut: 0.0005}}
+steps:
+  - at: 0.5
+    set: {{depth_of_cut: 0.00062}}
+"""
+
+
+@pytest.fixture
+def environment() -> Any:
+    with domain_id() as domain:
+        yield {
+            **os.environ,
+            'ROS_DOMAIN_ID': str(domain),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        }
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, '-m', 'lathe_chatter.cli', 'run', *arguments]
+
+
+def at_pace(name: str, folder: Path) -> Path:
+    """A shipped scenario, played faster."""
+    shipped = Path(__file__).resolve().parents[2] / 'config' / 'scenarios' / f'{name}.yaml'
+    text = shipped.read_text()
+    assert 'parameters:' in text
+    lines = [
+        f'{line}\n  real_time_factor: {PACE}' if line.startswith('parameters:') else line
+        for line in text.splitlines()
+    ]
+    copy = folder / f'{name}.yaml'
+    copy.write_text('\n'.join(lines))
+    return copy
+
+
+def play(scenario: Path, output: Path, environment: dict[str, str]) -> dict[str, Any]:
+    done = subprocess.run(
+        command('--scenario', str(scenario), '--output', str(output), '--json'),
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    figures: dict[str, Any] = json.loads(done.stdout)
+    return figures
+
+
+def test_the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    figures = play(at_pace('clearance', tmp_path), tmp_path / 'run', environment)
+    happened = [entry['what'] for entry in figures['occurrences']]
+    assert happened[0].startswith('start: 3000 rev/min, depth 0.5 mm, clearance 5 µm')
+    assert happened[1:3] == ['depth 0.62 mm', 'chatter flagged']
+    assert happened[3].endswith(' rev/min')
+    assert happened[4:] == ['flag cleared', 'end']
+    flagged, cured = figures['occurrences'][2], figures['occurrences'][-1]
+    # The open machine alone would be stable at this cut, the seated one is not.
+    assert flagged['roots']['open']['growth_rate'] < 0 < flagged['roots']['seated']['growth_rate']
+    # Partly seated, it chatters between the frequencies of the two.
+    bounds = [flagged['roots'][regime]['frequency'] for regime in ('open', 'seated')]
+    assert bounds[0] - 2.0 < flagged['frequency'] < bounds[1] + 2.0
+    assert flagged['growth_rate'] > 0
+    assert max(root['growth_rate'] for root in cured['roots'].values()) < 0
+    assert Path(figures['picture']).stat().st_size > 20_000
+
+
+def test_without_clearance_nothing_is_flagged(tmp_path: Path, environment: dict[str, str]) -> None:
+    figures = play(at_pace('no_clearance', tmp_path), tmp_path / 'run', environment)
+    happened = [entry['what'] for entry in figures['occurrences']]
+    assert happened[1:] == ['depth 0.62 mm', 'end']
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_is_complete_up_to_then(
+    number: signal.Signals, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    scenario = tmp_path / 'short.yaml'
+    scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 600.0'))
+    output = tmp_path / 'run'
+    with subprocess.Popen(
+        command('--scenario', str(scenario), '--output', str(output)),
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        seen = []
+        for line in process.stdout:
+            seen.append(line)
+            if 'depth_of_cut = 0.00062' in line:
+                process.send_signal(number)
+        assert process.wait(60) == 130, ''.join(seen)
+    assert 'complete up to that moment' in ''.join(seen)
+    assert (output / 'metadata.yaml').is_file()
+
+
+def test_a_refused_step_ends_the_run_with_the_reason(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    scenario = tmp_path / 'wrong.yaml'
+    scenario.write_text(SHORT.replace('depth_of_cut: 0.00062', 'depth_of_cut: 0.5'))
+    began = time.monotonic()
+    done = subprocess.run(
+        command('--scenario', str(scenario), '--output', str(tmp_path / 'run')),
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 2, f'{done.stdout}{done.stderr} {time.monotonic() - began}'
+    assert 'depth_of_cut' in done.stderr
+    assert '0.01 m' in done.stderr
+    assert 'Traceback' not in done.stdout + done.stderr

@@ -1,0 +1,81 @@
+"""A domain, a context and an executor of its own for each test of a node: no mocks, real DDS."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+# Before rclpy is imported anywhere: the tests of one machine must not meet those of another.
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+import domain_coordinator
+import pytest
+import rclpy
+from bench import Bench
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+
+PATIENCE = 60.0
+SpinUntil = Callable[..., None]
+
+
+@pytest.fixture(scope='session')
+def domain() -> Iterator[int]:
+    """A ROS domain that no other test process on this machine uses."""
+    with domain_coordinator.domain_id() as number:
+        os.environ['ROS_DOMAIN_ID'] = str(number)
+        yield int(number)
+
+
+@pytest.fixture
+def context(domain: int) -> Iterator[Context]:
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
+    """Spun by the test itself, so that an exception in a callback fails the test."""
+    executor = SingleThreadedExecutor(context=context)
+    yield executor
+    for node in executor.get_nodes():
+        executor.remove_node(node)
+        node.destroy_node()
+    executor.shutdown()
+
+
+@pytest.fixture
+def spin_until(executor: SingleThreadedExecutor) -> SpinUntil:
+    """Spin until a predicate holds; fail with `what` if it does not within a generous limit."""
+
+    def spin(predicate: Callable[[], object], what: str = 'the expected') -> None:
+        end = time.monotonic() + PATIENCE
+        while not predicate():
+            assert time.monotonic() < end, f'{what} did not come within {PATIENCE} s'
+            executor.spin_once(timeout_sec=0.05)
+
+    return spin
+
+
+@pytest.fixture
+def bench(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Bench:
+    """A client of the nodes under test."""
+    return Bench(context, executor, spin_until)
+
+
+@pytest.fixture
+def start(context: Context, executor: SingleThreadedExecutor) -> Callable[..., Any]:
+    """Start a node of a class with parameters given as for `-p`, spun by the test."""
+
+    def make(kind: Callable[..., Any], namespace: str = '', **values: Any) -> Any:
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        node = kind(context=context, namespace=namespace, parameter_overrides=overrides)
+        executor.add_node(node)
+        return node
+
+    return make

@@ -1,0 +1,56 @@
+"""Lost samples, proven from the times in the payload."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lathe_chatter.model import Array
+from lathe_chatter.nodes.continuity import Continuity, Joint
+
+RATE = 1e4
+
+
+def times(first: int, count: int) -> Array:
+    return np.arange(first, first + count) / RATE
+
+
+@pytest.mark.parametrize('start', [0, 36_000_000_000])
+@pytest.mark.parametrize('size', [1, 20, 1000])
+def test_blocks_that_follow_each_other_are_contiguous_after_any_time(
+    start: int, size: int
+) -> None:
+    heard = Continuity()
+    joints = [heard.join(times(start + k * size, size)) for k in range(1, 50)]
+    expected = [Joint.FIRST] + [Joint.CONTIGUOUS] * 48
+    assert joints[2 if size == 1 else 0 :] == expected[2 if size == 1 else 0 :]
+    assert (heard.samples, heard.lost) == (49 * size, 0)
+
+
+def test_every_lost_sample_is_counted() -> None:
+    random = np.random.default_rng(4)
+    heard = Continuity()
+    heard.join(times(0, 20))
+    next_sample, lost = 20, 0
+    for missing in random.integers(0, 5, 200).tolist():
+        joint = heard.join(times(next_sample + missing, 20))
+        assert joint is (Joint.GAP if missing else Joint.CONTIGUOUS)
+        next_sample += missing + 20
+        lost += missing
+    assert heard.lost == lost
+    assert heard.samples == 201 * 20
+
+
+def test_time_that_goes_back_is_another_run() -> None:
+    heard = Continuity()
+    heard.join(times(5000, 20))
+    assert heard.join(times(1, 20)) is Joint.RESTART
+    assert heard.join(times(21, 20)) is Joint.CONTIGUOUS
+    assert (heard.lost, heard.restarts) == (0, 1)
+
+
+def test_a_block_that_comes_twice_is_no_loss() -> None:
+    heard = Continuity()
+    heard.join(times(0, 20))
+    assert heard.join(times(0, 20)) is Joint.RESTART
+    assert heard.lost == 0

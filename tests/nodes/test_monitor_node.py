@@ -1,0 +1,190 @@
+"""The node `chatter_monitor`, fed over DDS with samples of the real machine, at full speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from bench import LATCHED, Bench
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Log
+from std_msgs.msg import Bool, Float64, Float64MultiArray, String
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import Array, BearingContact, Cut
+from lathe_chatter.nodes.messages import samples_to_message
+from lathe_chatter.nodes.monitor_node import MonitorNode
+
+BLOCK = 200
+STABLE = Cut(bearing_contact=BearingContact.NONE)
+UNSTABLE = Cut(depth_of_cut=0.001, bearing_contact=BearingContact.NONE)
+FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
+
+
+class Machine:
+    """A lathe of the core whose samples a publisher brings to the monitor."""
+
+    def __init__(self, bench: Bench, cut: Cut) -> None:
+        self.lathe = VirtualLathe(cut=cut)
+        self._bench = bench
+        self._publisher = bench.talk(Float64MultiArray, '/lathe/samples')
+
+    def send(self, samples: Array) -> None:
+        for k in range(0, len(samples), BLOCK):
+            self._publisher.publish(samples_to_message(samples[k : k + BLOCK]))
+            self._bench.executor.spin_once(timeout_sec=0.01)
+
+    def cut(self, seconds: float) -> None:
+        self.send(self.lathe.advance(round(seconds * 1e4)))
+
+
+@pytest.fixture
+def machine(start: Callable[..., Any], bench: Bench) -> Callable[[Cut], Machine]:
+    start(MonitorNode)
+    return lambda cut: Machine(bench, cut)
+
+
+def test_chatter_is_flagged_with_its_figures_and_cured(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
+    figures = {name: bench.listen(Float64, f'/chatter_monitor/{name}') for name in FIGURES}
+    log = bench.listen(Log, '/rosout', LATCHED)
+    lathe = machine(STABLE)
+    lathe.cut(2.0)
+    assert [flag.data for flag in flags] == [False]
+    lathe.lathe.retune(UNSTABLE)
+    lathe.cut(2.0)
+    bench.spin_until(lambda: [flag.data for flag in flags] == [False, True], 'the flag')
+    bench.spin_until(lambda: any('chatter at' in entry.msg for entry in log), 'the sentence')
+    assert states[-1].data == 'chatter'
+    # The rightmost root of this cut is 13.652715 +- 847.585268 i.
+    assert figures['frequency'][-1].data == pytest.approx(847.585268 / (2.0 * np.pi), rel=0.03)
+    assert figures['amplitude'][-1].data > 0.0
+    assert all(np.isfinite(m.data) for messages in figures.values() for m in messages)
+    lathe.lathe.retune(Cut(depth_of_cut=0.0002, bearing_contact=BearingContact.NONE))
+    lathe.cut(4.0)
+    bench.spin_until(lambda: [flag.data for flag in flags] == [False, True, False], 'the cure')
+    bench.spin_until(lambda: any('died out' in entry.msg for entry in log), 'the other sentence')
+
+
+def test_a_late_joiner_gets_the_flag_and_the_state(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    lathe = machine(UNSTABLE)
+    lathe.cut(2.0)
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
+    bench.spin_until(lambda: flags and states, 'what is latched')
+    assert [flag.data for flag in flags] == [True]
+    assert states[0].data == 'chatter'
+
+
+def test_lost_samples_are_counted_and_told(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    log = bench.listen(Log, '/rosout', LATCHED)
+    diagnostics = bench.listen(DiagnosticArray, '/diagnostics')
+    lathe = machine(STABLE)
+    lathe.cut(0.1)
+    lathe.lathe.advance(500)
+    lathe.cut(0.1)
+    sentence = 'At 0.100000 s: the samples up to 0.150100 s did not come.'
+    bench.spin_until(lambda: sentence in [entry.msg for entry in log], 'the sentence')
+
+    def counted() -> str:
+        return value(diagnostics, 'samples', 'samples lost')
+
+    bench.spin_until(lambda: counted() == '500', 'the count')
+
+
+def test_a_lathe_that_starts_again_is_followed(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    log = bench.listen(Log, '/rosout', LATCHED)
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    machine(UNSTABLE).cut(2.0)
+    bench.spin_until(lambda: flags[-1].data, 'the flag')
+    machine(STABLE).cut(1.0)
+    bench.spin_until(lambda: any('started again' in entry.msg for entry in log), 'the sentence')
+    bench.spin_until(lambda: not flags[-1].data, 'the end of the flag')
+
+
+def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> None:
+    start(MonitorNode)
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    publisher = bench.talk(Float64MultiArray, '/lathe/samples')
+    samples = VirtualLathe(cut=UNSTABLE).advance(20_000)
+    order = [5, 4, 3, 2, 0, 1]
+    names = (
+        'workpiece_velocity',
+        'workpiece_displacement',
+        'tool_velocity',
+        'tool_displacement',
+        'time',
+        'spindle_angle',
+    )
+    for k in range(0, len(samples), BLOCK):
+        publisher.publish(samples_to_message(samples[k : k + BLOCK, order], names))
+        bench.executor.spin_once(timeout_sec=0.01)
+    bench.spin_until(lambda: flags and flags[-1].data, 'the flag')
+
+
+@pytest.mark.parametrize(
+    ('message', 'complaint'),
+    [
+        (Float64MultiArray(), 'A block of samples has 2 dimensions, not 0.'),
+        (
+            samples_to_message(np.zeros((3, 2)), ('tool_displacement', 'tool_velocity')),
+            'The samples have no column time, only tool_displacement, tool_velocity.',
+        ),
+        (
+            samples_to_message(np.full((3, 8), np.nan)),
+            'The samples are not finite, or their times do not increase.',
+        ),
+    ],
+    ids=['layout', 'columns', 'nan'],
+)
+def test_what_are_no_samples_is_told_and_survived(
+    machine: Callable[[Cut], Machine], bench: Bench, message: Float64MultiArray, complaint: str
+) -> None:
+    diagnostics = bench.listen(DiagnosticArray, '/diagnostics')
+    publisher = bench.talk(Float64MultiArray, '/lathe/samples')
+    publisher.publish(message)
+    bench.spin_until(lambda: complaint in messages_of_level(diagnostics), complaint)
+    machine(STABLE).cut(0.1)
+    bench.spin_until(
+        lambda: value(diagnostics, 'samples', 'samples') == '1000', 'the samples after it'
+    )
+
+
+def test_silence_makes_the_state_unknown_and_keeps_the_flag(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
+    machine(UNSTABLE).cut(2.0)
+    bench.spin_until(lambda: states[-1].data == 'chatter', 'chatter')
+    bench.spin_until(lambda: states[-1].data == 'unknown', 'silence noticed')
+    assert flags[-1].data
+
+
+def value(messages: list[DiagnosticArray], part: str, key: str) -> str:
+    """The newest value in the diagnostics."""
+    found = [
+        entry.value
+        for message in messages
+        for status in message.status
+        for entry in status.values
+        if status.name == f'/chatter_monitor: {part}' and entry.key == key
+    ]
+    return str(found[-1]) if found else ''
+
+
+def messages_of_level(
+    messages: list[DiagnosticArray], level: bytes = DiagnosticStatus.ERROR
+) -> list[str]:
+    return [s.message for m in messages for s in m.status if s.level == level]

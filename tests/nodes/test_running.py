@@ -1,0 +1,81 @@
+"""Nodes as processes: what a wrong start says, and how a signal ends them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from bench import LATCHED, Bench
+from std_msgs.msg import Float64MultiArray, String
+
+from lathe_chatter.nodes.parameters import MONITOR as TABLE
+
+LATHE = 'lathe_chatter.nodes.lathe_node'
+MONITOR = 'lathe_chatter.nodes.monitor_node'
+WRONG = {
+    (LATHE, 'depth_of_cut:=nan'): (
+        'depth_of_cut is nan m: it must be a finite number from 0 to 0.01 m.'
+    ),
+    (LATHE, 'depth_of_cut:=deep'): (
+        "depth_of_cut is 'deep' m: it must be a finite number from 0 to 0.01 m."
+    ),
+    (LATHE, 'bearing_contact:=loose'): (
+        "bearing_contact is 'loose': it must be one of none, gap, seated."
+    ),
+    (LATHE, 'seed:=1.0'): 'seed is 1.0: it must be a whole number from 0 to 2147483647.',
+    (LATHE, 'sample_rate:=1250'): (
+        'sample_rate is 1250.0 Hz: it must be a whole multiple of tick_rate, which is 500 Hz.'
+    ),
+    (LATHE, 'use_sim_time:=yes please'): (
+        "use_sim_time is 'yes please': it must be true or false."
+    ),
+    (MONITOR, 'tool.mass:=-1'): f'tool.mass is -1 kg: it must be {TABLE["tool.mass"].allowed}.',
+}
+
+
+def start(module: str, *parameters: str) -> subprocess.Popen[str]:
+    words = [word for parameter in parameters for word in ('-p', parameter)]
+    return subprocess.Popen(
+        [sys.executable, '-m', module, '--ros-args', *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.usefixtures('domain')
+def test_a_wrong_parameter_at_the_start_is_one_sentence_that_names_it() -> None:
+    processes = {key: start(*key) for key in WRONG}  # all at once, for each takes a second
+    for key, process in processes.items():
+        out, err = process.communicate(timeout=60)
+        said = [line for line in (out + err).splitlines() if '[ERROR]' not in line]
+        assert said == [WRONG[key]]
+        assert process.returncode == 2
+
+
+@pytest.fixture
+def processes() -> Iterator[list[subprocess.Popen[str]]]:
+    started: list[subprocess.Popen[str]] = []
+    yield started
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_every_node_with_exit_0(
+    bench: Bench, processes: list[subprocess.Popen[str]], number: int
+) -> None:
+    # A whole number where a double belongs is taken as one.
+    processes += [start(LATHE, 'spindle_speed_rpm:=6000'), start(MONITOR)]
+    samples = bench.listen(Float64MultiArray, '/lathe/samples', LATCHED)
+    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
+    bench.spin_until(lambda: samples and states, 'a word of both')
+    for process in processes:
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 0
+        assert 'Traceback' not in err
