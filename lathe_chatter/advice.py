@@ -15,7 +15,12 @@ import numpy as np
 
 from lathe_chatter.characteristic import CharacteristicEquation, Complex, checked
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lobes import critical_depth, crossing_frequencies, echo_phase
+from lathe_chatter.lobes import (
+    critical_depth,
+    crossing_frequencies,
+    damped_equation,
+    echo_phase,
+)
 from lathe_chatter.model import Array, Machine
 from lathe_chatter.quantities import Quantity
 from lathe_chatter.roots import rightmost_roots
@@ -141,7 +146,7 @@ def stable_speed_intervals(
         raise ParameterError(
             'high_rpm', high_rpm, 'rev/min', f'above low_rpm, {low_rpm:g} rev/min'
         )
-    equation = CharacteristicEquation.of(machine, seated=seated)
+    equation = damped_equation(machine, seated=seated)
     stiffness = machine.cutting_stiffness(float(checked('depth_of_cut', depth_of_cut)))
     return _stable_intervals(equation, stiffness, slow, fast)
 
@@ -255,7 +260,7 @@ def _deepest_stable(
     machine: Machine, depth: float, *, seated: bool, low: float, high: float
 ) -> tuple[float, float]:
     """The deepest cut, to 1e-7 of it, below an unstable depth that some speed keeps stable."""
-    equation = CharacteristicEquation.of(machine, seated=seated)
+    equation = damped_equation(machine, seated=seated)
     stable, unstable, speed = 0.0, depth, low
     for _ in range(_HALVINGS):
         middle = 0.5 * (stable + unstable)

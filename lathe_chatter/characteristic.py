@@ -14,6 +14,7 @@ whose zeros are searched and counted. Its real part decides: chatter grows like 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -71,12 +72,18 @@ class CharacteristicEquation:
         return _derivative(self.flexible)
 
     @classmethod
-    def of(cls, machine: Machine, *, seated: bool) -> CharacteristicEquation:
-        """The equation of a machine whose bearing carries (seated) or does not."""
-        tool, workpiece = machine.tool, machine.workpiece
-        stiffness = machine.workpiece_stiffness(seated=seated)
-        of_tool = np.array([tool.mass, tool.damping, tool.stiffness])
-        of_workpiece = np.array([workpiece.mass, workpiece.damping, stiffness])
+    def of(
+        cls, machine: Machine, *, seated: bool, least_damping: float = 0.0
+    ) -> CharacteristicEquation:
+        """The equation of a machine whose bearing carries (seated) or does not.
+
+        With `least_damping` no mode has a smaller damping ratio than that.
+        """
+        stiffnesses = (machine.tool.stiffness, machine.workpiece_stiffness(seated=seated))
+        of_tool, of_workpiece = (
+            np.array([m.mass, max(m.damping, 2.0 * least_damping * math.sqrt(k * m.mass)), k])
+            for m, k in zip((machine.tool, machine.workpiece), stiffnesses, strict=True)
+        )
         return cls(
             tuple(np.convolve(of_tool, of_workpiece).tolist()),
             tuple((of_tool + of_workpiece).tolist()),

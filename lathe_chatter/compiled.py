@@ -2,8 +2,8 @@
 
 Numba keeps the machine code of a function until the function's own file changes. But a function
 holds the code of those that it calls, from other files too: after an update of one of them the
-stale code of its callers would be run, and give other numbers. So the code is kept in a folder
-named after the content of all files that hold compiled functions.
+stale code of its callers would be run, and give other numbers. So the code of a package is kept
+in a folder named after the content of all its files.
 """
 
 from __future__ import annotations
@@ -18,27 +18,25 @@ from typing import Any, TypeVar
 import numba
 
 Function = TypeVar('Function', bound=Callable[..., Any])
-_MARK = b'from lathe_chatter.compiled import'
 
 
-@lru_cache(maxsize=1)
-def _cache_folder() -> str:
-    """Where the machine code of this state of the sources belongs."""
-    digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.rglob('*.py')):
-        source = file.read_bytes()
-        if _MARK in source or file.name == 'layout.py':
-            digest.update(source)
+@lru_cache
+def _cache_folder(package: Path) -> str:
+    """Where the machine code of a package belongs, as its sources are now."""
+    digest = hashlib.sha256(Path(__file__).read_bytes())
+    for file in sorted(package.glob('*.py')):
+        digest.update(file.read_bytes())
     home = os.environ.get('XDG_CACHE_HOME') or '~/.cache'
     base = Path(numba.config.CACHE_DIR or Path(home).expanduser() / 'lathe_chatter')
-    return str(base / digest.hexdigest()[:16])
+    return str(base / f'{package.name}-{digest.hexdigest()[:16]}')
 
 
 def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Function], Function]:
     """A decorator for a function of plain numbers and arrays.
 
-    Floating point is strict IEEE: no operation is fused or reordered, so every machine computes
-    the same bits. Division by zero gives infinity, as in NumPy.
+    It may call compiled functions of its own package only, see above. Floating point is strict
+    IEEE: no operation is fused or reordered, so every machine computes the same bits. Division
+    by zero gives infinity, as in NumPy.
 
     Args:
         inline: Whether callers take the code into theirs, for what is called in every step.
@@ -47,7 +45,7 @@ def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Function
 
     def decorate(function: Function) -> Function:
         usual = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = _cache_folder()
+        numba.config.CACHE_DIR = _cache_folder(Path(function.__code__.co_filename).parent)
         try:
             options = {'cache': True, 'error_model': 'numpy', 'nogil': nogil}
             result: Function = numba.njit(forceinline=inline, **options)(function)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter import layout, propagation, stepper, surface
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.integrator import layout, propagation, stepper, surface
 from lathe_chatter.model import (
     SAMPLE_COLUMNS,
     Array,

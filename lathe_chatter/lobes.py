@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lathe_chatter.characteristic import CharacteristicEquation, Complex, checked
 from lathe_chatter.model import Array, Integers, Machine
@@ -22,6 +22,9 @@ from lathe_chatter.quantities import Quantity
 
 _PHASE_STEP = 0.2
 """Largest change of each part of the phase between two points of a frequency grid, rad."""
+_HALVINGS = 53
+_LEAST_DAMPING = 1e-9
+"""What a mode without damping is taken to have where a limit is computed."""
 _REFINEMENTS = 100
 _BATCH = 32
 _LOBES = Quantity('number of lobes', low=1.0, high=1e6)
@@ -72,7 +75,7 @@ def lobe_boundary(
     limit = _DEPTH_LIMIT.check('depth_limit', depth_limit)
     count = int(_LOBES.check('lobes', lobes))
     wanted = int(_POINTS.check('points', points))
-    equation = CharacteristicEquation.of(machine, seated=seated)
+    equation = damped_equation(machine, seated=seated)
     crossings = crossing_frequencies(equation, machine.cutting_stiffness(limit))
     bands = crossings.reshape(-1, 2) if crossings.size % 2 == 0 else np.zeros((0, 2))
     share = wanted // max(len(bands), 1)
@@ -103,7 +106,7 @@ def critical_depth(machine: Machine, spindle_speed_rpm: float, *, seated: bool) 
 
     Returns:
         The smallest w at which a root reaches the imaginary axis, m; infinite for a material
-        that needs no force, 0 where any cut excites a mode without damping.
+        that needs no force, next to 0 where any cut excites a mode without damping.
 
     Raises:
         ParameterError: If the speed is not allowed.
@@ -121,40 +124,48 @@ def critical_depths(machine: Machine, spindle_speed_rpm: ArrayLike, *, seated: b
     delay = 60.0 / speeds.ravel()
     depth = np.full(delay.size, np.inf)
     if machine.cutting_coefficient > 0.0:
-        equation = CharacteristicEquation.of(machine, seated=seated)
+        equation = damped_equation(machine, seated=seated)
         order = np.argsort(delay)
         # Neighbours share a grid: it is as fine as the longest delay among them asks for.
         for batch in np.split(order, np.arange(_BATCH, delay.size, _BATCH)):
             stiffness = _critical_stiffness(equation, delay[batch])
             depth[batch] = stiffness / machine.cutting_coefficient
-        depth[_excites_an_undamped_mode(machine, delay, seated=seated)] = 0.0
     return depth.reshape(speeds.shape)
+
+
+def damped_equation(machine: Machine, *, seated: bool) -> CharacteristicEquation:
+    """The equation for a search along the imaginary axis, on which no pole may lie."""
+    return CharacteristicEquation.of(machine, seated=seated, least_damping=_LEAST_DAMPING)
 
 
 def crossing_frequencies(equation: CharacteristicEquation, cutting_stiffness: float) -> Array:
     """The frequencies, rising, at which 2 C w Re G(i omega) = -1: the boundary at one depth.
 
-    With x = omega^2 they are the positive roots of |a|^2 + 2 C w Re(p conj(a)) = 0.
-
     Args:
-        equation: Machine and contact regime.
+        equation: Machine and contact regime, with some damping.
         cutting_stiffness: C w, N/m.
 
     Returns:
         Angular frequencies, rad/s (at most 4,).
     """
-    a0, a1, a2, a3, a4 = equation.uncoupled
-    p0, p1, p2 = equation.flexible
-    real, odd = np.array([a0, -a2, a4]), np.array([-a1, a3])  # a = real + i omega odd
-    size = np.polyadd(np.polymul(real, real), np.append(np.polymul(odd, odd), 0.0))
-    along = np.polyadd(np.polymul([-p0, p2], real), np.append(p1 * odd, 0.0))
-    condition = np.polyadd(size, 2.0 * cutting_stiffness * along)
-    # In units of a typical x, for the coefficients to be of one size.
-    unit = float(np.sqrt(a4 / a0))
-    roots = np.roots(condition * unit ** np.arange(4.0, -1.0, -1.0)) * unit
-    square = np.sort(roots.real[(np.abs(roots.imag) < 1e-9 * unit) & (roots.real > 0.0)])
-    crossings: Array = np.sqrt(square)
-    return crossings
+
+    def excess(omega: Array) -> Array:
+        value: Array = 1.0 + 2.0 * cutting_stiffness * equation.receptance(omega).real
+        return value
+
+    # Past both modes Re G rises to 0 like that of a free mass: at most two roots are there.
+    free = np.abs(equation.delay_free_roots(np.array([0.0, cutting_stiffness])))
+    top = 4.0 * float(free.max())
+    near = _near_poles_and_zeros(equation, 0.0, top)
+    grid = np.unique(np.concatenate((near, np.geomspace(1e-2 * float(free.min()), top, 100))))
+    negative = excess(grid) < 0.0
+    cell = np.flatnonzero(negative[1:] != negative[:-1])
+    low, high = grid[cell], grid[cell + 1]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        left = (excess(middle) < 0.0) == negative[cell]
+        low, high = np.where(left, middle, low), np.where(left, high, middle)
+    return np.asarray(0.5 * (low + high), dtype=float)
 
 
 def echo_phase(receptance: Complex) -> Array:
@@ -210,26 +221,20 @@ def _refine(
     return omega
 
 
-def _excites_an_undamped_mode(
-    machine: Machine, delay: Array, *, seated: bool
-) -> NDArray[np.bool_]:
-    """Whether the first trace of depth moves a root that starts on the imaginary axis right.
-
-    From D: ds/d(C w) = -(1 - e^(-s tau)) / (2 m s) at s = i omega, real part -sin / (2 m omega).
-    """
-    excites = np.zeros(delay.size, bool)
-    stiffnesses = (machine.tool.stiffness, machine.workpiece_stiffness(seated=seated))
-    for mode, stiffness in zip((machine.tool, machine.workpiece), stiffnesses, strict=True):
-        if mode.damping == 0.0:
-            excites |= np.sin(math.sqrt(stiffness / mode.mass) * delay) < 0.0
-    return excites
-
-
 def _poles_and_zeros(equation: CharacteristicEquation) -> tuple[Array, Array]:
     """Heights and half-widths, rad/s, of everything that turns the phase of G."""
     free = equation.delay_free_roots(np.zeros(1))[0]
     points = np.concatenate((free, np.roots(equation.flexible)))
     return np.abs(points.imag), np.maximum(np.abs(points.real), 1e-9 * np.abs(points))
+
+
+def _near_poles_and_zeros(equation: CharacteristicEquation, low: float, high: float) -> Array:
+    """Frequencies low..high between which no pole or zero turns the phase by more than a step."""
+    height, width = _poles_and_zeros(equation)
+    angle = np.arange(-0.5 * np.pi + _PHASE_STEP / 2.0, 0.5 * np.pi, _PHASE_STEP)
+    near = (height[:, None] + width[:, None] * np.tan(angle)).ravel()
+    inside: Array = near[(near > low) & (near < high)]
+    return inside
 
 
 def _frequency_grid(equation: CharacteristicEquation, longest: float, shortest: float) -> Array:
@@ -238,14 +243,10 @@ def _frequency_grid(equation: CharacteristicEquation, longest: float, shortest: 
     The grid ends past the last minimum of Re G, omega^2 = omega_n^2 (1 + 2 zeta), and two more
     turns: what lies beyond is deeper.
     """
-    height, width = _poles_and_zeros(equation)
     free = equation.delay_free_roots(np.zeros(1))
     top = 2.0 * float(np.abs(free).max()) + 4.0 * np.pi / shortest
-    even = np.linspace(0.0, top, math.ceil(top * longest / _PHASE_STEP) + 2)
-    angle = np.arange(-0.5 * np.pi + _PHASE_STEP / 2.0, 0.5 * np.pi, _PHASE_STEP)
-    near = (height[:, None] + width[:, None] * np.tan(angle)).ravel()
-    grid = np.unique(np.concatenate((even, near[(near > 0.0) & (near < top)])))
-    return grid[grid > 0.0]
+    even = np.linspace(0.0, top, math.ceil(top * longest / _PHASE_STEP) + 2)[1:]
+    return np.unique(np.concatenate((even, _near_poles_and_zeros(equation, 0.0, top))))
 
 
 def _dense_where_steep(
@@ -253,10 +254,8 @@ def _dense_where_steep(
 ) -> Array:
     """Frequencies low..high, equally spaced in the phase that poles and zeros contribute."""
     height, width = _poles_and_zeros(equation)
-    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 34)[1:-1]
-    near = (height[:, None] + width[:, None] * np.tan(angle)).ravel()
-    inside = near[(near > low) & (near < high)]
-    grid = np.unique(np.concatenate((inside, np.linspace(low, high, 33))))
+    near = _near_poles_and_zeros(equation, low, high)
+    grid = np.unique(np.concatenate((near, np.linspace(low, high, 33))))
     phase = np.arctan((grid[:, None] - height) / width).sum(axis=1)
     phase += np.pi * (grid - low) / (high - low)
     return np.interp(np.linspace(phase[0], phase[-1], points), phase, grid)

@@ -127,7 +127,7 @@ def leading_roots(
     for density in _DENSITIES:
         seeds = _dense_seeds(equation, stiffness, delay, density, beyond=wanted)
         found = _polish(equation, stiffness, delay, seeds, dense=True).points
-        roots = _distinct(found)[:wanted]
+        roots = _distinct(found, wanted)
         if roots.size == 0:
             continue
         margin = _MARGINS[1] * np.abs(roots).max()
@@ -239,8 +239,9 @@ def _polish(
             done = newton.residual <= residual_tolerance(s, tau)
             # One step more than the residual asks for: it costs nothing and ends at rounding.
             s = s - newton.value / np.where(newton.slope == 0.0, 1.0, newton.slope)
-            arrived.append(_Owned(owner[done], s[done]))
-            going = ~done & np.isfinite(s)
+            finite = np.isfinite(newton.size) & np.isfinite(s)
+            arrived.append(_Owned(owner[done & finite], s[done & finite]))
+            going = ~done & finite
             if not dense:
                 going &= s.real * tau > -_STRIP
             owner, s, k, tau = owner[going], s[going], k[going], tau[going]
@@ -257,8 +258,8 @@ def _best(found: _Owned, count: int) -> Complex:
     return best
 
 
-def _distinct(points: Complex) -> Complex:
-    """Each point once, in the upper half plane, the rightmost first."""
+def _distinct(points: Complex, count: int) -> Complex:
+    """The first `count` points, each once, in the upper half plane, the rightmost first."""
     height = np.abs(points.imag)
     upper = points.real + 1j * np.where(height > 1e-9 * np.abs(points), height, 0.0)
     upper = upper[np.argsort(-upper.real)]
@@ -266,4 +267,6 @@ def _distinct(points: Complex) -> Complex:
     for point in upper.tolist():
         if all(abs(point - other) > 1e-8 * abs(other) for other in kept):
             kept.append(point)
+        if len(kept) == count:
+            break
     return np.array(kept, complex)

@@ -10,12 +10,18 @@ from __future__ import annotations
 
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS
+from lathe_chatter.model import SAMPLE_COLUMNS, BearingContact, Cut
+
+_BLOCK, _LONG_ENOUGH = 1000, 10
 
 
 def warm_up() -> None:
-    """Cut a little and watch it, which compiles all that later calls need."""
-    ChatterDetector().update(VirtualLathe().advance(2000), SAMPLE_COLUMNS)
+    """Cut until it chatters, and watch that: compiles or loads all that later calls need."""
+    detector = ChatterDetector()
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.SEATED))
+    for _ in range(_LONG_ENOUGH):
+        if detector.update(lathe.advance(_BLOCK), SAMPLE_COLUMNS).chatter:
+            break
 
 
 if __name__ == '__main__':

@@ -16,6 +16,7 @@ from lathe_chatter.cell import Cell
 from lathe_chatter.commands.report import show_run
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.history import History, read_history
+from lathe_chatter.recording import read_run
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,
@@ -33,6 +34,7 @@ NAME = 'run'
 HELP = 'start lathe, monitor and recorder, play a scenario, and leave the recorded run'
 EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
 
+INTERRUPTED = 130
 _START_PATIENCE = 30.0
 """s for the nodes to find each other."""
 _SETTLING = 0.5
@@ -70,14 +72,22 @@ def run(options: Namespace) -> int:
     with console.status('Compiling the integrator (once on a machine) ...'):
         warm_up()
     interrupted = _play(scenario, output, console)
+    if interrupted and not _has_samples(output):
+        console.print('Interrupted before the lathe had cut anything.')
+        return INTERRUPTED
     history = read_history(output)
     figures = show_run(history, console)
     if options.json:
         Console(highlight=False, soft_wrap=True).print(json.dumps(figures))
     if interrupted:
         console.print('Interrupted: the run above is complete up to that moment.')
-        return 130
+        return INTERRUPTED
     return _verdict(scenario, history, console)
+
+
+def _has_samples(output: Path) -> bool:
+    """Whether a run was begun and has samples of a lathe."""
+    return output.exists() and any(name.endswith('/samples') for name in read_run(output).topics)
 
 
 def _play(scenario: Scenario, output: Path, console: Console) -> bool:

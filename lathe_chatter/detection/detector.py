@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from lathe_chatter.detection import states
-from lathe_chatter.detection.advice import better_speed, rule_of_thumb
+from lathe_chatter.detection.advice import better_speed
 from lathe_chatter.detection.identification import (
     ANGULAR_FREQUENCY,
     CUTTING,
     GROWTH,
     GROWTH_ERROR,
     STIFFNESS,
-    STIFFNESS_ERROR,
     WINDOW_OUTPUTS,
     WINDOW_SIZE,
     WINDOW_TOOL_POWER,
@@ -25,16 +23,14 @@ from lathe_chatter.detection.identification import (
     rightmost_in_band,
 )
 from lathe_chatter.detection.intake import Break, Hop, Intake, Rate
-from lathe_chatter.detection.kernels import Band, band_of, design, gain
+from lathe_chatter.detection.kernels import band_of, design, gain
 from lathe_chatter.detection.signals import (
-    ANGLE,
-    FILLED,
     PRODUCTS_SIZE,
     follow,
     fresh_memory,
 )
 from lathe_chatter.detection.states import Estimate
-from lathe_chatter.model import Array, Integers, Machine
+from lathe_chatter.model import Array, Machine
 
 _PAPER = Machine()
 _WINDOWS = np.array([1, 2, 4, 8, 16, 32])

@@ -23,10 +23,10 @@ from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.pacing import SECOND, Pacer
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameter_table import Value
 from lathe_chatter.nodes.parameters import (
     CUT_ROWS,
     LATHE,
-    Value,
     cut_from,
     machine_from,
     samples_per_tick,

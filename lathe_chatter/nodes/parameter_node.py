@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.nodes.parameters import ParameterTable, Value
+from lathe_chatter.nodes.parameter_table import ParameterTable, Value
 
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 _OF_QOS = 'qos_overrides.'

@@ -1,186 +1,21 @@
-"""The parameters of the nodes: one table of rows, from which everything about them is made.
+"""The parameters of the nodes: one table each, from which everything about them is made.
 
 Names, defaults, units, limits and meanings of the machine and the cut stand once, beside the
 fields of the model; what only a node has is added here. Descriptors, declarations, validation,
 the sentence of a refusal and the tables of the README come from these rows.
-
-A number is coerced only where nothing is lost: a whole number is accepted where a double belongs
-(`depth_of_cut:=0`, `spindle_speed_rpm:=6000`), at the start and at run time. Nothing else is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
-from difflib import get_close_matches
-from enum import Enum
-from typing import Any, TypeGuard
-
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from dataclasses import fields
+from typing import Any
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import SAMPLE_RATE, SEED, SPINDLE_ACCELERATION
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.quantities import Quantity, check_choice, quantity_of
-
-Value = bool | int | float | str | list[str]
-Values = Mapping[str, Value]
-
-_LARGEST_EXACT_INTEGER = 2**53
-
-
-@dataclass(frozen=True)
-class Row:
-    """One parameter of a node.
-
-    Attributes:
-        name: As `ros2 param` writes it, with dots where it belongs to a part of the machine.
-        default: The value without an override; its type is the parameter's type.
-        meaning: One phrase.
-        limits: Unit and closed limits of a number; None for anything else.
-        choices: The words that a text may be; None where any will do.
-        run_time: Whether it may change while the node runs.
-    """
-
-    name: str
-    default: Value
-    meaning: str
-    limits: Quantity | None = None
-    choices: type[Enum] | None = None
-    run_time: bool = False
-
-    @property
-    def unit(self) -> str:
-        """SI unit, or rev/min; empty where there is none."""
-        return self.limits.unit if self.limits else ''
-
-    @property
-    def allowed(self) -> str:
-        """What is accepted, as the end of a sentence."""
-        if self.choices is not None:
-            return 'one of ' + ', '.join(str(choice.value) for choice in self.choices)
-        if isinstance(self.default, bool):
-            return 'true or false'
-        if self.limits is not None and isinstance(self.default, int):
-            return f'a whole number from {self.limits.low:.0f} to {self.limits.high:.0f}'
-        if self.limits is not None:
-            return self.limits.allowed
-        return 'a text' if isinstance(self.default, str) else 'a list of texts'
-
-    def check(self, value: object) -> Value:
-        """The value as the parameter holds it.
-
-        Raises:
-            ParameterError: If it has the wrong type or lies outside what is allowed.
-        """
-        if self.choices is not None:
-            if not isinstance(value, str):
-                raise ParameterError(self.name, value, self.unit, self.allowed)
-            return str(check_choice(self.name, value, self.choices).value)
-        if isinstance(self.default, (list, tuple)):
-            if isinstance(value, (list, tuple)) and all(isinstance(v, str) for v in value):
-                return list(value)
-        elif isinstance(self.default, (bool, str)):
-            if isinstance(value, type(self.default)):
-                return value
-        elif self.limits is not None and _fits(value, self.default):
-            if isinstance(self.default, float):
-                return self.limits.check(self.name, value)
-            if self.limits.low <= value <= self.limits.high:
-                return value
-        raise ParameterError(self.name, value, self.unit, self.allowed)
-
-    def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows; a range makes rclpy itself refuse nan and inf."""
-        descriptor = ParameterDescriptor(
-            name=self.name,
-            description=f'{self.meaning}{self.unit and f" [{self.unit}]"}',
-            additional_constraints=f'must be {self.allowed}',
-            read_only=not self.run_time,
-        )
-        if self.limits is not None and isinstance(self.default, float):
-            low = 0.0 if self.limits.or_zero else self.limits.low
-            ends = FloatingPointRange(from_value=low, to_value=self.limits.high)
-            descriptor.floating_point_range = [ends]
-        elif self.limits is not None and isinstance(self.default, int):
-            low, high = int(self.limits.low), int(self.limits.high)
-            descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
-        return descriptor
-
-
-def _fits(value: object, default: Value) -> TypeGuard[int]:
-    """Whether a number can become one of the default's type with nothing lost."""
-    if isinstance(value, bool):
-        return False
-    if isinstance(value, int):
-        return abs(value) <= _LARGEST_EXACT_INTEGER
-    return isinstance(value, float) and isinstance(default, float)
-
-
-class ParameterTable:
-    """The rows of one node by name.
-
-    Args:
-        rows: In the order in which they are declared.
-        derive: Defaults that follow from what was given, as a function of the given values; for
-            instance the bearing's stiffness as half of the workpiece's. May raise ParameterError
-            where given values contradict each other.
-    """
-
-    def __init__(
-        self, rows: Iterable[Row], derive: Callable[[Values], Values] = lambda _given: {}
-    ) -> None:
-        """Index the rows."""
-        self._rows = {row.name: row for row in rows}
-        self._derive = derive
-
-    def __iter__(self) -> Iterator[Row]:
-        return iter(self._rows.values())
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._rows
-
-    def __getitem__(self, name: str) -> Row:
-        return self._rows[name]
-
-    def complete(self, given: Mapping[str, object]) -> dict[str, Value]:
-        """The value of every row at the start: what was given, and defaults for the rest.
-
-        Raises:
-            ParameterError: For the first given value, in order of the rows, that is not allowed,
-                or for values that contradict each other.
-        """
-        checked = {row.name: row.check(given[row.name]) for row in self if row.name in given}
-        defaults = {row.name: row.default for row in self}
-        return {**defaults, **self._derive(checked), **checked}
-
-    def unknown(self, name: str) -> str:
-        """A sentence about a name that is no parameter, with the nearest that is."""
-        near = get_close_matches(name, self._rows, n=1)
-        hint = f': did you mean {near[0]}?' if near else '.'
-        return f'There is no parameter {name!r}{hint}'
-
-
-def rows_of(instance: Any, *, prefix: str = '', run_time: bool = False) -> Iterator[Row]:
-    """The rows of a frozen value of the model, with its values as defaults.
-
-    Args:
-        instance: A dataclass whose fields are quantities, choices, or such dataclasses.
-        prefix: Put before each name, with its dot.
-        run_time: Whether they may change while the node runs.
-    """
-    for entry in fields(instance):
-        value = getattr(instance, entry.name)
-        name = prefix + entry.name
-        limits = quantity_of(entry)
-        if is_dataclass(value):
-            yield from rows_of(value, prefix=f'{name}.', run_time=run_time)
-        elif isinstance(value, Enum):
-            meaning = (type(value).__doc__ or '').partition('.')[0].partition(' (')[0]
-            yield Row(name, value.value, meaning, choices=type(value), run_time=run_time)
-        elif limits is not None:
-            yield Row(name, value, limits.meaning, limits, run_time=run_time)
+from lathe_chatter.nodes.parameter_table import ParameterTable, Row, Values, rows_of
+from lathe_chatter.quantities import Quantity
 
 
 def cut_from(values: Values) -> Cut:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
 from collections.abc import Callable
 from types import FrameType
 
 import rclpy
+from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -23,6 +25,9 @@ except ImportError:  # an rclpy older than the executor
 
 _LOOK_UP = 0.1
 """s after which a node that nothing happens to looks whether it was told to end."""
+
+_DELIVERY = 2.0
+"""s that the readers of a node have, at its end, to take what was published last."""
 
 _START_ERRORS = (
     LatheChatterError,
@@ -88,8 +93,17 @@ def run_node(
         raise SystemExit(2) from None
     finally:
         if node is not None:
+            _deliver(node)
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _deliver(node: Node) -> None:
+    """Wait until readers have what was published: with its publishers a node's history goes."""
+    until = time.monotonic() + _DELIVERY
+    for publisher in node.publishers:
+        left = max(until - time.monotonic(), 0.0)
+        publisher.wait_for_all_acked(Duration(seconds=left))
 
 
 def spin(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:

@@ -9,10 +9,10 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
+from lathe_chatter.nodes.parameter_table import Row
 from lathe_chatter.nodes.parameters import (
     LATHE,
     MONITOR,
-    Row,
     cut_from,
     machine_from,
     samples_per_tick,
@@ -147,3 +147,13 @@ def test_a_tick_has_a_whole_number_of_samples() -> None:
 def test_an_unknown_name_is_told_its_nearest() -> None:
     assert LATHE.unknown('depth_of_cutt').endswith('did you mean depth_of_cut?')
     assert LATHE.unknown('zzz') == "There is no parameter 'zzz'."
+
+
+def test_the_table_of_a_readme_has_every_row() -> None:
+    lines = LATHE.markdown().splitlines()
+    assert len(lines) == 2 + len(CONTRACT)
+    assert len({line.count('|') for line in lines}) == 1
+    assert (
+        '| `depth_of_cut` | 0.0005 | m | a finite number from 0 to 0.01 m | run time '
+        '| depth of cut w |'
+    ) in lines

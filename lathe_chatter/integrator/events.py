@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from lathe_chatter.compiled import compiled
+from lathe_chatter.integrator.propagation import slope_at, value_at
 from lathe_chatter.model import Array
-from lathe_chatter.propagation import slope_at, value_at
 
 NEVER = 2.0
 """An answer beyond the piece [0, 1]."""

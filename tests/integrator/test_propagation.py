@@ -9,9 +9,9 @@ import pytest
 from numpy.polynomial import Polynomial
 from scipy.linalg import expm
 
-from lathe_chatter import propagation
+from lathe_chatter.integrator import propagation
+from lathe_chatter.integrator.propagation import ENGAGED, IN_CUT, TERMS
 from lathe_chatter.model import Array, Machine, Mode
-from lathe_chatter.propagation import ENGAGED, IN_CUT, TERMS
 
 _MACHINE = Machine(Mode(0.05, 775.0, 0.05), Mode(0.08, 650.0, 0.03), bearing_stiffness=2e4)
 _DEPTH, _CLEARANCE = 1e-3, 5e-6

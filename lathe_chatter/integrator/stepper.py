@@ -13,19 +13,19 @@ import math
 
 import numpy as np
 
-from lathe_chatter import layout, noise
 from lathe_chatter.compiled import compiled
-from lathe_chatter.model import Array, Integers
-from lathe_chatter.pieces import (
+from lathe_chatter.integrator import layout, noise
+from lathe_chatter.integrator.pieces import (
     PIECE_SIZE,
     Scratch,
     add_measurement,
     take_step,
     write_sample,
 )
-from lathe_chatter.propagation import IN_CUT, TERMS
-from lathe_chatter.quiet import take_quiet_steps
-from lathe_chatter.spindle import speed_and_slope
+from lathe_chatter.integrator.propagation import IN_CUT, TERMS
+from lathe_chatter.integrator.quiet import take_quiet_steps
+from lathe_chatter.integrator.spindle import speed_and_slope
+from lathe_chatter.model import Array, Integers
 
 
 @compiled()

@@ -13,7 +13,7 @@ import pytest
 from numba import njit
 from scipy import stats
 
-from lathe_chatter import noise
+from lathe_chatter.integrator import noise
 from lathe_chatter.model import Array
 
 _COUNT = 200_000

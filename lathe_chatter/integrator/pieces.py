@@ -10,18 +10,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from lathe_chatter import layout, noise, propagation, surface
 from lathe_chatter.compiled import compiled
-from lathe_chatter.events import NEVER, first_crossing, may_turn_back
-from lathe_chatter.model import Array, Integers
-from lathe_chatter.propagation import (
+from lathe_chatter.integrator import layout, noise, propagation, surface
+from lathe_chatter.integrator.events import NEVER, first_crossing, may_turn_back
+from lathe_chatter.integrator.propagation import (
     ENGAGED,
     IN_CUT,
     TERMS,
     relative_acceleration,
     whole_step,
 )
-from lathe_chatter.spindle import speed_and_slope, time_to_turn, turned
+from lathe_chatter.integrator.spindle import speed_and_slope, time_to_turn, turned
+from lathe_chatter.model import Array, Integers
 
 _MOST_FLIPS = 32
 """Events in one step before it is finished without looking for more: a grazing contact that

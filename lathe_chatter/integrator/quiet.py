@@ -7,18 +7,18 @@ stops before the first that is not, which pieces.py then takes.
 
 from __future__ import annotations
 
-from lathe_chatter import layout, surface
 from lathe_chatter.compiled import compiled
-from lathe_chatter.events import may_turn_back
-from lathe_chatter.model import Array, Integers
-from lathe_chatter.pieces import DETAIL, add, write_sample
-from lathe_chatter.propagation import (
+from lathe_chatter.integrator import layout, surface
+from lathe_chatter.integrator.events import may_turn_back
+from lathe_chatter.integrator.pieces import DETAIL, add, write_sample
+from lathe_chatter.integrator.propagation import (
     CLEARANCE,
     ENGAGED,
     IN_CUT,
     relative_acceleration,
     whole_step,
 )
+from lathe_chatter.model import Array, Integers
 
 
 @compiled()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from lathe_chatter.spindle import speed_and_slope, time_to_turn, turned
+from lathe_chatter.integrator.spindle import speed_and_slope, time_to_turn, turned
 
 _LAWS = [  # base rev/s, slope rev/s2, amplitude, phase, frequency Hz
     (50.0, 0.0, 0.0, 0.0, 1.0),

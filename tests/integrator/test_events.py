@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import polynomial
 
-from lathe_chatter.events import NEVER, first_crossing, may_turn_back
+from lathe_chatter.integrator.events import NEVER, first_crossing, may_turn_back
+from lathe_chatter.integrator.propagation import TERMS
 from lathe_chatter.model import Array
-from lathe_chatter.propagation import TERMS
 
 
 def _series(coefficients: Sequence[float] | Array) -> Array:

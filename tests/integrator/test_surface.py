@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from lathe_chatter import surface
+from lathe_chatter.integrator import surface
 from lathe_chatter.model import Array
 
 _QUINTIC = Polynomial([0.3, -1.0, 2.0, 0.7, -1.3, 0.4])
