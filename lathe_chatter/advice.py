@@ -29,7 +29,7 @@ _SAMPLES = 9
 _ZOOMS = 2
 _INTERVALS = 8
 """Intervals looked into, widest first: those of the highest lobes are slivers."""
-_HALVINGS = 24
+_HALVINGS = 14
 _COUNT = Quantity('number of recommended speeds', low=1.0, high=1000.0)
 _MARGIN = Quantity('relative distance from an edge of stability', high=0.5)
 
@@ -259,7 +259,7 @@ def _scan(machine: Machine, depth: float, start: Array, end: Array, *, seated: b
 def _deepest_stable(
     machine: Machine, depth: float, *, seated: bool, low: float, high: float
 ) -> tuple[float, float]:
-    """The deepest cut, to 1e-7 of it, below an unstable depth that some speed keeps stable."""
+    """The deepest cut, to 1e-4 of it, below an unstable depth that some speed keeps stable."""
     equation = damped_equation(machine, seated=seated)
     stable, unstable, speed = 0.0, depth, low
     for _ in range(_HALVINGS):

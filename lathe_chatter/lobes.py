@@ -11,6 +11,7 @@ gives one depth and, for each lobe, one spindle speed.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,6 @@ from lathe_chatter.quantities import Quantity
 
 _PHASE_STEP = 0.2
 """Largest change of each part of the phase between two points of a frequency grid, rad."""
-_HALVINGS = 53
 _LEAST_DAMPING = 1e-9
 """What a mode without damping is taken to have where a limit is computed."""
 _REFINEMENTS = 100
@@ -149,23 +149,23 @@ def crossing_frequencies(equation: CharacteristicEquation, cutting_stiffness: fl
         Angular frequencies, rad/s (at most 4,).
     """
 
-    def excess(omega: Array) -> Array:
-        value: Array = 1.0 + 2.0 * cutting_stiffness * equation.receptance(omega).real
-        return value
+    def excess(omega: Array) -> tuple[Array, Array]:
+        receptance = equation.receptance(omega)
+        slope = 1j * receptance * equation.receptance_log_slope(1j * omega)
+        return (
+            1.0 + 2.0 * cutting_stiffness * receptance.real,
+            2.0 * cutting_stiffness * slope.real,
+        )
 
-    # Past both modes Re G rises to 0 like that of a free mass: at most two roots are there.
+    # Far above both modes G is that of a free mass, -1 / (mu omega^2): the last crossing is at
+    # sqrt(2) times the frequency that C w alone would give.
     free = np.abs(equation.delay_free_roots(np.array([0.0, cutting_stiffness])))
     top = 4.0 * float(free.max())
     near = _near_poles_and_zeros(equation, 0.0, top)
     grid = np.unique(np.concatenate((near, np.geomspace(1e-2 * float(free.min()), top, 100))))
-    negative = excess(grid) < 0.0
+    negative = excess(grid)[0] < 0.0
     cell = np.flatnonzero(negative[1:] != negative[:-1])
-    low, high = grid[cell], grid[cell + 1]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        left = (excess(middle) < 0.0) == negative[cell]
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return np.asarray(0.5 * (low + high), dtype=float)
+    return _solve(excess, grid[cell], grid[cell + 1])
 
 
 def echo_phase(receptance: Complex) -> Array:
@@ -184,35 +184,33 @@ def _critical_stiffness(equation: CharacteristicEquation, delay: Array) -> Array
     possible = np.minimum(receptance.real[column], receptance.real[column + 1]) < 0.0
     row, column = row[possible], column[possible]
     wanted = np.maximum(lobe[row, column], lobe[row, column + 1])
-    omega = _refine(equation, delay[row], frequency[column], frequency[column + 1], wanted)
+    crossing = delay[row]
+
+    def excess(omega: Array) -> tuple[Array, Array]:
+        phase = omega * crossing - echo_phase(equation.receptance(omega))
+        slope = crossing - 2.0 * equation.receptance_log_slope(1j * omega).real
+        return phase / (2.0 * np.pi) - wanted, slope / (2.0 * np.pi)
+
+    omega = _solve(excess, frequency[column], frequency[column + 1])
     real = equation.receptance(omega).real
     stiffness = np.full(delay.size, np.inf)
     np.minimum.at(stiffness, row[real < 0.0], -0.5 / real[real < 0.0])
     return stiffness
 
 
-def _refine(
-    equation: CharacteristicEquation, delay: Array, low: Array, high: Array, lobe: Array
-) -> Array:
-    """Solve (omega tau - 3 pi - 2 arg G) / 2 pi = lobe between low and high (n,).
+def _solve(function: Callable[[Array], tuple[Array, Array]], low: Array, high: Array) -> Array:
+    """The root between low and high (n,) of a function that gives its values and slopes.
 
     Newton's method, kept inside brackets that every iteration shortens.
     """
-
-    def error(omega: Array) -> Array:
-        phase = omega * delay - echo_phase(equation.receptance(omega))
-        difference: Array = phase / (2.0 * np.pi) - lobe
-        return difference
-
-    rising = error(high) >= 0.0
+    rising = function(high)[0] >= 0.0
     omega = 0.5 * (low + high)
     for _ in range(_REFINEMENTS):
-        miss = error(omega)
-        above = (miss >= 0.0) == rising
+        value, slope = function(omega)
+        above = (value >= 0.0) == rising
         low, high = np.where(above, low, omega), np.where(above, omega, high)
-        slope = (delay - 2.0 * equation.receptance_log_slope(1j * omega).real) / (2.0 * np.pi)
         with np.errstate(divide='ignore', invalid='ignore'):
-            step = omega - miss / slope
+            step = omega - value / slope
         following = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
         settled = np.abs(following - omega) <= 1e-15 * omega
         omega = following

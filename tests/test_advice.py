@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from machines import random_machine
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model import Machine
+from lathe_chatter.model import Machine, Mode
 from lathe_chatter.stability import (
     critical_depth,
     recommend_speeds,
@@ -29,6 +31,16 @@ def test_stable_intervals_are_where_the_rightmost_root_is_left(seed: int) -> Non
         inside = np.any((ends[:, :1] <= SPEEDS) & (ends[:, 1:] >= SPEEDS), axis=0)
         growth = rightmost_roots(machine, SPEEDS, depth, seated=seated).real
         assert np.array_equal(inside, growth < 0.0)
+
+
+@pytest.mark.parametrize('undamped', ['tool', 'workpiece'])
+def test_a_mode_without_damping_is_counted_right(undamped: str) -> None:
+    machine = replace(Machine(), **{undamped: Mode(0.05, 700.0, 0.0)})
+    ends = stable_speed_intervals(machine, 4e-4, seated=False, low_rpm=1000.0, high_rpm=12000.0)
+    inside = np.any((ends[:, :1] <= SPEEDS) & (ends[:, 1:] >= SPEEDS), axis=0)
+    growth = rightmost_roots(machine, SPEEDS, 4e-4, seated=False).real
+    assert np.array_equal(inside, growth < 0.0)
+    assert 10 < inside.sum() < 140
 
 
 def test_at_the_ends_of_an_interval_a_root_stands_on_the_axis() -> None:

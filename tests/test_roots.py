@@ -7,7 +7,12 @@ from reference import collocation
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine, Mode
-from lathe_chatter.stability import leading_roots, rightmost_root, rightmost_roots
+from lathe_chatter.stability import (
+    count_roots_right_of,
+    leading_roots,
+    rightmost_root,
+    rightmost_roots,
+)
 
 PUBLISHED = [
     (3000.0, 0.0005, False, -8.999066, 825.483211),
@@ -41,6 +46,35 @@ def test_random_machines_agree_with_collocation(seed: int) -> None:
         found = rightmost_root(machine, rpm, depth, seated=seated)
         assert found.real == pytest.approx(expected.real, abs=1e-9)
         assert found.imag == pytest.approx(expected.imag, abs=1e-9)
+
+
+def test_a_growth_map_agrees_with_collocation_at_every_point() -> None:
+    speeds, depths = np.linspace(1000.0, 12000.0, 23), np.linspace(1e-4, 2e-3, 8)
+    found = rightmost_roots(Machine(), speeds, depths[:, None], seated=False)
+    for (row, column), root in np.ndenumerate(found):
+        expected = collocation.rightmost_root(Machine(), speeds[column], depths[row], seated=False)
+        assert root.real == pytest.approx(expected.real, abs=1e-9)
+
+
+def test_leaving_out_the_proof_leaves_the_roots() -> None:
+    speeds, depths = np.geomspace(300.0, 12000.0, 40), np.linspace(1e-4, 2e-3, 8)[:, None]
+    proven = rightmost_roots(Machine(), speeds, depths, seated=True)
+    found = rightmost_roots(Machine(), speeds, depths, seated=True, proven=False)
+    assert np.array_equal(found, proven)
+
+
+def test_far_from_any_real_lathe_the_root_is_still_found_and_proven() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(25):
+        masses, frequencies = 10 ** rng.uniform(-3, 2, 2), 10 ** rng.uniform(1, 3.5, 2)
+        damping = rng.choice([0.0, 0.001, 0.3, 1.0], 2)
+        modes = [Mode(*numbers) for numbers in zip(masses, frequencies, damping, strict=True)]
+        machine = Machine(*modes, cutting_coefficient=10 ** rng.uniform(3, 10))
+        cut = (10 ** rng.uniform(2.5, 4.4), 10 ** rng.uniform(-6, -2))
+        root = rightmost_root(machine, *cut, seated=True)
+        above = root.real + 1e-6 * abs(root)
+        assert count_roots_right_of(machine, *cut, above, seated=True) == 0
+        assert count_roots_right_of(machine, *cut, root.real - 1e-6 * abs(root), seated=True) > 0
 
 
 @pytest.mark.parametrize('rpm', [200.0, 300.0])

@@ -84,6 +84,14 @@ class RecorderNode(ParameterNode):
         """The folder that is being recorded into."""
         return None if self._writer is None else self._writer.folder
 
+    def messages_of(self, name: str) -> int:
+        """How many messages of a topic, by its full name, were recorded."""
+        return self._channels[name].messages if name in self._channels else 0
+
+    def lost_of(self, name: str) -> int:
+        """How many of its messages are known to be missing."""
+        return self._channels[name].lost if name in self._channels else 0
+
     def start(self) -> Path:
         """Begin a run.
 
@@ -177,9 +185,9 @@ class RecorderNode(ParameterNode):
         channel = self._channels[name]
         sequence = info['publication_sequence_number']
         if channel.single and sequence is not None:
-            # A publisher that was started again counts from the beginning.
-            if channel.last is not None and sequence > channel.last + 1:
-                channel.lost += sequence - channel.last - 1
+            # Numbers begin with 1; a publisher that was started again counts from there.
+            expected = 1 if channel.last is None else channel.last + 1
+            channel.lost += max(sequence - expected, 0)
             channel.last = sequence
         channel.messages += 1
         self._writer.write(

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
 FILE_NAME = 'metadata.yaml'
 VERSION = 9
+_DUMPER = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
 
 
 @dataclass(frozen=True)
@@ -33,42 +36,39 @@ class Topic:
     qos: tuple[Mapping[str, Any], ...] = ()
 
 
-@dataclass
-class FileCount:
-    """What one MCAP file of a run holds; times in ns since the epoch."""
+class FileCount(NamedTuple):
+    """What one MCAP file of a run holds; log times in ns since the epoch."""
 
     path: str
-    first: int | None = None
-    last: int | None = None
-    messages: int = 0
-
-    def note(self, time: int) -> None:
-        """Count a message."""
-        self.first = time if self.first is None else min(self.first, time)
-        self.last = time if self.last is None else max(self.last, time)
-        self.messages += 1
+    first: int
+    last: int
+    messages: int
 
 
-@dataclass
-class RunCount:
-    """What a run holds so far."""
+def describe(
+    files: Sequence[FileCount],
+    topics: Iterable[Topic],
+    counts: Counter[str],
+    distribution: str,
+) -> dict[str, Any]:
+    """The content of metadata.yaml.
 
-    files: list[FileCount] = field(default_factory=list)
-    topics: dict[str, tuple[Topic, int]] = field(default_factory=dict)
-
-
-def describe(count: RunCount, distribution: str) -> dict[str, Any]:
-    """The content of metadata.yaml."""
-    firsts = [file.first for file in count.files if file.first is not None]
-    lasts = [file.last for file in count.files if file.last is not None]
-    start, end = min(firsts, default=0), max(lasts, default=0)
+    Args:
+        files: In order.
+        topics: Every one that was announced.
+        counts: Messages by name of topic.
+        distribution: Of ROS.
+    """
+    written = [file for file in files if file.messages]
+    start = min((file.first for file in written), default=0)
+    end = max((file.last for file in written), default=0)
     return {
         'rosbag2_bagfile_information': {
             'version': VERSION,
             'storage_identifier': 'mcap',
             'duration': {'nanoseconds': end - start},
             'starting_time': {'nanoseconds_since_epoch': start},
-            'message_count': sum(file.messages for file in count.files),
+            'message_count': sum(file.messages for file in files),
             'topics_with_message_count': [
                 {
                     'topic_metadata': {
@@ -78,21 +78,21 @@ def describe(count: RunCount, distribution: str) -> dict[str, Any]:
                         'offered_qos_profiles': [dict(profile) for profile in topic.qos],
                         'type_description_hash': topic.type_hash,
                     },
-                    'message_count': messages,
+                    'message_count': counts[topic.name],
                 }
-                for topic, messages in count.topics.values()
+                for topic in topics
             ],
             'compression_format': '',
             'compression_mode': '',
-            'relative_file_paths': [file.path for file in count.files],
+            'relative_file_paths': [file.path for file in files],
             'files': [
                 {
                     'path': file.path,
-                    'starting_time': {'nanoseconds_since_epoch': file.first or 0},
-                    'duration': {'nanoseconds': (file.last or 0) - (file.first or 0)},
+                    'starting_time': {'nanoseconds_since_epoch': file.first},
+                    'duration': {'nanoseconds': file.last - file.first},
                     'message_count': file.messages,
                 }
-                for file in count.files
+                for file in files
             ],
             'custom_data': None,
             'ros_distro': distribution,
@@ -100,17 +100,41 @@ def describe(count: RunCount, distribution: str) -> dict[str, Any]:
     }
 
 
+def dump(values: Any) -> str:
+    """YAML in the order of the values."""
+    text: str = yaml.dump(values, Dumper=_DUMPER, sort_keys=False)
+    return text
+
+
 def dump_qos(qos: Sequence[Mapping[str, Any]]) -> str:
     """Offered profiles as the metadata of an MCAP channel has them."""
-    return yaml.safe_dump([dict(profile) for profile in qos], sort_keys=False).strip()
+    return dump([dict(profile) for profile in qos]).strip()
 
 
-def write_metadata(folder: Path, count: RunCount, distribution: str) -> None:
-    """Replace metadata.yaml as a whole: a reader finds the old one or the new one."""
-    text = yaml.safe_dump(describe(count, distribution), sort_keys=False)
+def replace_file(folder: Path, text: str) -> None:
+    """Replace metadata.yaml as a whole: a reader finds the old one or the new one.
+
+    Raises:
+        OSError: If the disk refuses; the old one then stays.
+    """
     temporary = folder / f'{FILE_NAME}.tmp'
-    with temporary.open('w', encoding='utf-8') as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(folder / FILE_NAME)
+    try:
+        with temporary.open('w', encoding='utf-8') as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(folder / FILE_NAME)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(folder)
+
+
+def sync_folder(folder: Path) -> None:
+    """Put the names in a folder on the disk: a file without its name is lost in a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,10 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Array
 
 _SPLIT = re.compile(r'_(\d+)\.mcap$')
+
+
+_DAMAGE = (McapError, ValueError, RuntimeError, EOFError, struct.error)
+"""What readers raise on a damaged file: mcap's own, a CRC, lz4's, too few bytes."""
 
 
 class RunReadError(LatheChatterError):
@@ -78,8 +83,11 @@ class Run:
         """The type of each topic by name."""
         found: dict[str, str] = {}
         for file in self.files:
-            with file.open('rb') as stream:
-                summary = make_reader(stream).get_summary()
+            try:
+                with file.open('rb') as stream:
+                    summary = make_reader(stream).get_summary()
+            except _DAMAGE as error:
+                raise RunReadError(f'{file} is damaged: {error}.') from None
             if summary is None:
                 raise RunReadError(f'{file} has no summary: it is damaged or no MCAP file.')
             for channel in summary.channels.values():
@@ -110,7 +118,7 @@ class Run:
                             message.sequence,
                             store.deserialize_cdr(message.data, schema.name),
                         )
-                except McapError as error:
+                except _DAMAGE as error:
                     raise RunReadError(f'{file} is damaged: {error}.') from None
 
     def samples(self, topic: str | None = None) -> Samples:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pytest
 from bench import LATCHED, Bench
 from std_msgs.msg import Float64MultiArray, String
 
 from lathe_chatter.nodes.parameters import MONITOR as TABLE
+from lathe_chatter.warm_up import warm_up
 
 LATHE = 'lathe_chatter.nodes.lathe_node'
 MONITOR = 'lathe_chatter.nodes.monitor_node'
@@ -36,10 +37,10 @@ WRONG = {
 }
 
 
-def start(module: str, *parameters: str) -> subprocess.Popen[str]:
+def start(module: str, *parameters: str, more: Sequence[str] = ()) -> subprocess.Popen[str]:
     words = [word for parameter in parameters for word in ('-p', parameter)]
     return subprocess.Popen(
-        [sys.executable, '-m', module, '--ros-args', *words],
+        [sys.executable, '-m', module, '--ros-args', *words, *more],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -65,17 +66,27 @@ def processes() -> Iterator[list[subprocess.Popen[str]]]:
         process.communicate()
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_every_node_with_exit_0(
-    bench: Bench, processes: list[subprocess.Popen[str]], number: int
+    bench: Bench, processes: list[subprocess.Popen[str]]
 ) -> None:
-    # A whole number where a double belongs is taken as one.
-    processes += [start(LATHE, 'spindle_speed_rpm:=6000'), start(MONITOR)]
-    samples = bench.listen(Float64MultiArray, '/lathe/samples', LATCHED)
-    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
-    bench.spin_until(lambda: samples and states, 'a word of both')
-    for process in processes:
+    warm_up()  # or else each process compiles for itself
+    heard = []
+    for cell in ('/interrupted', '/terminated'):
+        # A whole number where a double belongs is taken as one.
+        space = ('-r', f'__ns:={cell}')
+        processes += [
+            start(LATHE, 'spindle_speed_rpm:=6000', more=space),
+            start(MONITOR, more=space),
+        ]
+        heard += [
+            bench.listen_first(Float64MultiArray, f'{cell}/lathe/samples', LATCHED),
+            bench.listen_first(String, f'{cell}/chatter_monitor/state', LATCHED),
+        ]
+    bench.spin_until(lambda: all(heard), 'a word of all')
+    signals = [signal.SIGINT] * 2 + [signal.SIGTERM] * 2
+    for process, number in zip(processes, signals, strict=True):
         process.send_signal(number)
+    for process in processes:
         _, err = process.communicate(timeout=60)
         assert process.returncode == 0
         assert 'Traceback' not in err

@@ -1,0 +1,67 @@
+"""Losses on the way, told by the numbers that publishers give their messages.
+
+A message says its number but not its publisher, and topics such as /diagnostics have several.
+So numbers are followed as sequences that grow by one; where there are more sequences than
+publishers, one ended and another went on in its place, and what lies between was lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_SETTLING = 1.0
+"""s that a new publisher may be heard before the graph has it."""
+
+
+@dataclass
+class _Sequence:
+    """Numbers that followed each other; times in s."""
+
+    first: int
+    last: int
+    begun: float
+    heard: float
+
+
+class Numbering:
+    """Follows the numbers of the messages of one topic.
+
+    Attributes:
+        lost: Messages known to be missing so far.
+    """
+
+    def __init__(self) -> None:
+        """Begin before the first message."""
+        self.lost = 0
+        self._sequences: list[_Sequence] = []
+
+    def take(self, number: int, now: float) -> None:
+        """A message came, at a steady time in s."""
+        for sequence in self._sequences:
+            if sequence.last == number - 1:
+                sequence.last, sequence.heard = number, now
+                return
+        self._sequences.append(_Sequence(number, number, now, now))
+
+    def settle(self, publishers: int, now: float) -> None:
+        """Conclude what has been lost, where the graph is known to have so many publishers."""
+        late = [each for each in self._sequences if each.begun <= now - _SETTLING]
+        for sequence in late[1:]:
+            if len(self._sequences) <= max(publishers, 1):
+                return
+            self._join(sequence)
+
+    def _join(self, sequence: _Sequence) -> None:
+        """Join a sequence to the one that it goes on, if one had ended when it began."""
+        ended = [each for each in self._sequences if each.heard <= sequence.begun]
+        ended = [each for each in ended if each is not sequence]
+        before = [each for each in ended if each.last < sequence.first]
+        if before:
+            origin = max(before, key=lambda each: each.last)
+            self.lost += sequence.first - origin.last - 1
+            sequence.begun = origin.begun
+            sequence.first = origin.first
+            self._sequences.remove(origin)
+        elif ended:
+            # Its publisher was started again, and counts from the beginning.
+            self._sequences.remove(min(ended, key=lambda each: each.heard))

@@ -1,0 +1,120 @@
+"""The recorder over real DDS: what it hears is on disk, and what it did not hear is counted."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bench import Bench
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.nodes.recorder_node import RecorderNode
+from lathe_chatter.recording import read_run
+
+Start = Callable[..., Any]
+KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_a_lathe_is_recorded_from_its_first_sample(
+    start: Start, spin_until: Any, tmp_path: Path
+) -> None:
+    lathe = start(LatheNode, real_time_factor=1.0)
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'))
+    spin_until(lambda: recorder.messages_of('/lathe/samples') > 100, 'a hundred blocks')
+    recorder.stop()
+    samples = read_run(tmp_path / 'run').samples()
+    assert samples.columns['time'][0] == pytest.approx(1e-4)
+    assert samples.gaps == []
+    assert len(samples.columns['time']) == 20 * recorder.messages_of('/lathe/samples')
+    assert lathe.count_subscribers('/lathe/samples') == 1
+
+
+def test_the_services_start_split_and_stop(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'], autostart=False)
+    publisher = bench.node.create_publisher(Float64, '/n', KEPT)
+    assert recorder.run is None
+    answer = bench.call(Trigger, '/run_recorder/stop', Trigger.Request())
+    assert not answer.success
+    answer = bench.call(Trigger, '/run_recorder/start', Trigger.Request())
+    assert answer.success, answer.message
+    for k in range(20):
+        if k == 10:
+            spin_until(lambda: recorder.messages_of('/n') == 10, 'ten messages')
+            assert bench.call(Trigger, '/run_recorder/split', Trigger.Request()).success
+        publisher.publish(Float64(data=float(k)))
+    spin_until(lambda: recorder.messages_of('/n') == 20, 'twenty messages')
+    answer = bench.call(Trigger, '/run_recorder/stop', Trigger.Request())
+    assert 'holds 20 messages, and 0 were lost' in answer.message
+    run = read_run(tmp_path / 'run')
+    assert len(run.files) == 2
+    assert [m.message.data for m in run.messages('/n')] == [float(k) for k in range(20)]
+    answer = bench.call(Trigger, '/run_recorder/start', Trigger.Request())
+    assert not answer.success
+    assert 'exists already' in answer.message
+
+
+def test_a_loss_on_the_way_is_counted(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
+    # Keeps one message only: all but the last are gone before the recorder finds the topic.
+    publisher = bench.node.create_publisher(
+        Float64, '/n', QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    )
+    for k in range(50):
+        publisher.publish(Float64(data=float(k)))
+    spin_until(lambda: recorder.messages_of('/n') == 1, 'the message that was kept')
+    assert recorder.lost_of('/n') == 49
+    assert '49 were lost' in recorder.stop()
+
+
+def test_an_existing_folder_is_refused(start: Start, tmp_path: Path) -> None:
+    with pytest.raises(LatheChatterError, match='exists already'):
+        start(RecorderNode, output=str(tmp_path))
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_exit_0_and_a_finished_run(
+    number: signal.Signals, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    publisher = bench.node.create_publisher(Float64, '/n', KEPT)
+    parameters = [f'output:={tmp_path / "run"}', 'topics:=[/n]']
+    words = [word for parameter in parameters for word in ('-p', parameter)]
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'lathe_chatter.nodes.recorder_node', '--ros-args', *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    spin_until(lambda: publisher.get_subscription_count() == 1, 'the recorder')
+    for k in range(100):
+        publisher.publish(Float64(data=float(k)))
+    publisher.wait_for_all_acked()
+    process.send_signal(number)
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, out
+    run = read_run(tmp_path / 'run')
+    assert [m.message.data for m in run.messages('/n')] == [float(k) for k in range(100)]
+
+
+def test_an_existing_folder_at_the_start_of_the_process_is_one_sentence(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            sys.executable, '-m', 'lathe_chatter.nodes.recorder_node',
+            '--ros-args', '-p', f'output:={tmp_path}',
+        ],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.strip() == f'{tmp_path} exists already, and no recorded run is overwritten.'
