@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -149,7 +150,7 @@ def crossing_frequencies(equation: CharacteristicEquation, cutting_stiffness: fl
         Angular frequencies, rad/s (at most 4,).
     """
 
-    def excess(omega: Array) -> tuple[Array, Array]:
+    def excess(omega: Array) -> tuple[Any, Any]:
         receptance = equation.receptance(omega)
         slope = 1j * receptance * equation.receptance_log_slope(1j * omega)
         return (
@@ -186,7 +187,7 @@ def _critical_stiffness(equation: CharacteristicEquation, delay: Array) -> Array
     wanted = np.maximum(lobe[row, column], lobe[row, column + 1])
     crossing = delay[row]
 
-    def excess(omega: Array) -> tuple[Array, Array]:
+    def excess(omega: Array) -> tuple[Any, Any]:
         phase = omega * crossing - echo_phase(equation.receptance(omega))
         slope = crossing - 2.0 * equation.receptance_log_slope(1j * omega).real
         return phase / (2.0 * np.pi) - wanted, slope / (2.0 * np.pi)
@@ -198,7 +199,7 @@ def _critical_stiffness(equation: CharacteristicEquation, delay: Array) -> Array
     return stiffness
 
 
-def _solve(function: Callable[[Array], tuple[Array, Array]], low: Array, high: Array) -> Array:
+def _solve(function: Callable[[Array], tuple[Any, Any]], low: Array, high: Array) -> Array:
     """The root between low and high (n,) of a function that gives its values and slopes.
 
     Newton's method, kept inside brackets that every iteration shortens.
@@ -219,7 +220,7 @@ def _solve(function: Callable[[Array], tuple[Array, Array]], low: Array, high: A
     return omega
 
 
-def _poles_and_zeros(equation: CharacteristicEquation) -> tuple[Array, Array]:
+def _poles_and_zeros(equation: CharacteristicEquation) -> tuple[Any, Any]:
     """Heights and half-widths, rad/s, of everything that turns the phase of G."""
     free = equation.delay_free_roots(np.zeros(1))[0]
     points = np.concatenate((free, np.roots(equation.flexible)))

@@ -105,8 +105,13 @@ class ChatterDetector:
     def _take_hop(self, hop: Hop) -> None:
         self._newest = (self._newest + 1) % 64
         self._hops += 1
-        follow(hop.block, self._strides, self._kernels, self._memory,
-               (self._products[self._newest], self._motion))
+        follow(
+            hop.block,
+            self._strides,
+            self._kernels,
+            self._memory,
+            (self._products[self._newest], self._motion),
+        )
         turned = hop.block[-1, 0] - hop.block[0, 0]
         speed = turned / (len(hop.block) - 1) * self._sample_rate
         if speed * 60.0 < self._speed_range[0]:
@@ -114,11 +119,19 @@ class ChatterDetector:
             return
         figures = np.array([1.0 / speed, 0.8, 0.0, 0.0])
         windows = self._windows
-        identify(self._products, self._newest, _WINDOWS, self._mechanics, figures, self._guess, windows)
+        identify(
+            self._products, self._newest, _WINDOWS, self._mechanics, figures, self._guess, windows
+        )
         if self._hops % 8 == 0 and not math.isnan(windows[_REFERENCE, GROWTH]):
-            self._guess = rightmost_in_band(self._mechanics, max(windows[_REFERENCE, CUTTING], 0.0),
-                float(np.clip(windows[_REFERENCE, STIFFNESS], self._mechanics[5], self._mechanics[6])),
-                1.0 / speed, self._guess)
+            self._guess = rightmost_in_band(
+                self._mechanics,
+                max(windows[_REFERENCE, CUTTING], 0.0),
+                float(
+                    np.clip(windows[_REFERENCE, STIFFNESS], self._mechanics[5], self._mechanics[6])
+                ),
+                1.0 / speed,
+                self._guess,
+            )
         self._decide(hop.time, speed)
 
     def _decide(self, time: float, speed: float) -> None:
@@ -130,12 +143,14 @@ class ChatterDetector:
         best = [float(value) for value in windows[int(np.argmin(errors))]]
         omega = best[ANGULAR_FREQUENCY]
         taps = self._kernels.band.size
-        comb = abs(1.0 - np.exp(-1j * omega / speed)) if omega == omega else 1.0
+        comb = abs(1.0 - np.exp(-1j * omega / speed)) if math.isfinite(omega) else 1.0
         amplitude = 2.0 * math.sqrt(windows[1, WINDOW_TOOL_POWER]) / max(comb, 0.1)
-        if omega == omega:
+        if math.isfinite(omega):
             amplitude /= max(gain(self._band, self._thinned, taps, omega / (2 * math.pi)), 0.1)
         with np.errstate(invalid='ignore'):
-            surely = (windows[:, GROWTH] / windows[:, GROWTH_ERROR] > 6.0) & (windows[:, GROWTH] > 0.2)
+            surely = (windows[:, GROWTH] / windows[:, GROWTH_ERROR] > 6.0) & (
+                windows[:, GROWTH] > 0.2
+            )
         suspect = bool(surely.any()) and amplitude > self._smallest
         self._suspected = self._suspected + 1 if suspect else 0
         if self._alarmed:
@@ -155,6 +170,15 @@ class ChatterDetector:
         if self._alarmed and self._since_alarm in {0, 10, 30}:
             speed_rpm = better_speed(self._machine, best[CUTTING], self._speed_range, 60 * speed)
         self._estimate = Estimate(
-            time, state, self._alarmed, best[GROWTH], best[GROWTH_ERROR], omega / (2 * math.pi),
-            amplitude, best[CUTTING], stiffness,
-            bool(stiffness > open_ + 0.1 * bearing) if stiffness == stiffness else None, speed_rpm)
+            time,
+            state,
+            self._alarmed,
+            best[GROWTH],
+            best[GROWTH_ERROR],
+            omega / (2 * math.pi),
+            amplitude,
+            best[CUTTING],
+            stiffness,
+            bool(stiffness > open_ + 0.1 * bearing) if math.isfinite(stiffness) else None,
+            speed_rpm,
+        )

@@ -148,7 +148,9 @@ class CommittedFile:
         """Attach a file of another kind, dated in ns since the epoch."""
         self._close_chunk()
         attachment = record_bytes(
-            Attachment(create_time=time, log_time=time, name=name, media_type=media_type, data=data)
+            Attachment(
+                create_time=time, log_time=time, name=name, media_type=media_type, data=data
+            )
         )
         index = AttachmentIndex(
             offset=self._end,
