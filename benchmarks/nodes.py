@@ -176,26 +176,37 @@ def burn() -> None:
         sum(range(10_000))
 
 
+@contextlib.contextmanager
+def busy_cores() -> Iterator[int]:
+    """Every core busy elsewhere; how many there are."""
+    count = os.cpu_count() or 1
+    burners = [multiprocessing.Process(target=burn, daemon=True) for _ in range(count)]
+    for burner in burners:
+        burner.start()
+    try:
+        yield count
+    finally:
+        for burner in burners:
+            burner.kill()  # the handlers of rclpy, which a fork inherits, ignore SIGTERM
+            burner.join()
+
+
 def measure_lateness(seconds: float) -> None:
     """Lateness of the ticks with every core busy elsewhere."""
-    burners = [multiprocessing.Process(target=burn) for _ in range(os.cpu_count() or 1)]
     with running(LATHE), ear() as listener:
         listener.listen_to_samples()
         listener.wait_for_samples()
-        for burner in burners:
-            burner.start()
-        listener.spin(limit=1.0)
-        begin = len(listener.sent)
-        listener.spin(limit=seconds)
-        for burner in burners:
-            burner.terminate()
+        with busy_cores() as count:
+            listener.spin(limit=1.0)
+            begin = len(listener.sent)
+            listener.spin(limit=seconds)
         sent = np.array(listener.sent[begin:], dtype=np.int64)
         late = (sent - sent[0]) / 1e9 - TICK * np.arange(sent.size)
         late = (late - late.min()) * 1e3
         p50, p99, largest = np.quantile(late, [0.5, 0.99, 1.0])
         heard = listener.heard
         print(
-            f'ticks, {len(burners)} cores busy, {sent.size} of them: late by {p50:.3f} ms (p50), '
+            f'ticks, {count} cores busy, {sent.size} of them: late by {p50:.3f} ms (p50), '
             f'{p99:.3f} ms (p99), {largest:.3f} ms (largest)\n'
             f'samples lost {heard.lost}, repeated {heard.restarts}'
         )

@@ -147,19 +147,15 @@ class CommittedFile:
     def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
         """Attach a file of another kind, dated in ns since the epoch."""
         self._close_chunk()
-        attachment = record_bytes(
-            Attachment(
-                create_time=time, log_time=time, name=name, media_type=media_type, data=data
-            )
-        )
+        named = {'name': name, 'media_type': media_type}
+        attachment = record_bytes(Attachment(create_time=time, log_time=time, data=data, **named))
         index = AttachmentIndex(
             offset=self._end,
             length=len(attachment),
             log_time=time,
             create_time=time,
             data_size=len(data),
-            name=name,
-            media_type=media_type,
+            **named,
         )
         self._other_indexes += record_bytes(index)
         self._attachments += 1

@@ -13,6 +13,9 @@ IDENTITY = 'lathe_chatter/made_by'
 PARAMETERS = 'lathe_chatter/parameters'
 """Name of the records of a node's parameters, followed by its full name; values as JSON."""
 
+RECEPTION = 'lathe_chatter/reception'
+"""Name of the record of what came and what was lost on the way, by topic, as JSON."""
+
 
 def identity() -> dict[str, str]:
     """Who records, on what, since when."""

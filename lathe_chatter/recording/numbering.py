@@ -26,13 +26,18 @@ class _Sequence:
 class Numbering:
     """Follows the numbers of the messages of one topic.
 
+    Args:
+        kept: Whether publishers keep messages for late readers: what then is missing before
+            the first message, which has the number 1, is lost too.
+
     Attributes:
         lost: Messages known to be missing so far.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, kept: bool = False) -> None:
         """Begin before the first message."""
         self.lost = 0
+        self._kept = kept
         self._sequences: list[_Sequence] = []
 
     def take(self, number: int, now: float) -> None:
@@ -41,10 +46,17 @@ class Numbering:
             if sequence.last == number - 1:
                 sequence.last, sequence.heard = number, now
                 return
+        if self._kept and not self._sequences:
+            self.lost += number - 1
         self._sequences.append(_Sequence(number, number, now, now))
 
     def settle(self, publishers: int, now: float) -> None:
-        """Conclude what has been lost, where the graph is known to have so many publishers."""
+        """Conclude what has been lost, where the graph is known to have so many publishers.
+
+        Args:
+            publishers: How many the topic has.
+            now: Steady time, s; infinite at the end, when nothing more will settle.
+        """
         late = [each for each in self._sequences if each.begun <= now - _SETTLING]
         for sequence in late[1:]:
             if len(self._sequences) <= max(publishers, 1):

@@ -30,12 +30,12 @@ def test_a_lathe_is_recorded_from_its_first_sample(
     lathe = start(LatheNode, real_time_factor=1.0)
     recorder = start(RecorderNode, output=str(tmp_path / 'run'))
     spin_until(lambda: recorder.messages_of('/lathe/samples') > 100, 'a hundred blocks')
+    assert lathe.count_subscribers('/lathe/samples') == 1
     recorder.stop()
     samples = read_run(tmp_path / 'run').samples()
     assert samples.columns['time'][0] == pytest.approx(1e-4)
     assert samples.gaps == []
     assert len(samples.columns['time']) == 20 * recorder.messages_of('/lathe/samples')
-    assert lathe.count_subscribers('/lathe/samples') == 1
 
 
 def test_the_services_start_split_and_stop(

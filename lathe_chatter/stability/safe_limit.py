@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.characteristic import checked
-from lathe_chatter.lobes import critical_depth, critical_depths
 from lathe_chatter.model import Array, BearingContact, Cut, Machine
 from lathe_chatter.quantities import Quantity
+from lathe_chatter.stability.characteristic import checked
+from lathe_chatter.stability.lobes import critical_depth, critical_depths
 
 _CLEARANCE = Quantity('bearing clearance gamma', 'm')
 _FEED = Quantity('feed per revolution f', 'm')

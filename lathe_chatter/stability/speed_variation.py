@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.characteristic import CharacteristicEquation, checked
 from lathe_chatter.model import Array, Cut, Integers, Machine
+from lathe_chatter.stability.characteristic import CharacteristicEquation, checked
 
 _ORDER = 16
 _ELEMENT_PHASE = 5.0

@@ -7,22 +7,28 @@ turns roots and lobes into a spindle speed. None needs more than NumPy.
 
 from __future__ import annotations
 
-from lathe_chatter.advice import (
+from lathe_chatter.stability.advice import (
     CuttingAdvice,
     SpeedAdvice,
     recommend_speeds,
     stable_speed_intervals,
 )
-from lathe_chatter.lobes import (
+from lathe_chatter.stability.lobes import (
     LobeBoundary,
     critical_depth,
     critical_depths,
     lobe_boundary,
 )
-from lathe_chatter.root_count import count_roots_right_of
-from lathe_chatter.roots import leading_roots, rightmost_root, rightmost_roots
-from lathe_chatter.safe_limit import ContactAt, SafeLimit, contact_at, safe_limit, seating_depth
-from lathe_chatter.speed_variation import (
+from lathe_chatter.stability.root_count import count_roots_right_of
+from lathe_chatter.stability.roots import leading_roots, rightmost_root, rightmost_roots
+from lathe_chatter.stability.safe_limit import (
+    ContactAt,
+    SafeLimit,
+    contact_at,
+    safe_limit,
+    seating_depth,
+)
+from lathe_chatter.stability.speed_variation import (
     Floquet,
     dominant_eigenvalue,
     floquet,

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.characteristic import CharacteristicEquation, Complex, checked
 from lathe_chatter.model import Array, Integers, Machine
 from lathe_chatter.quantities import Quantity
+from lathe_chatter.stability.characteristic import CharacteristicEquation, Complex, checked
 
 _PHASE_STEP = 0.2
 """Largest change of each part of the phase between two points of a frequency grid, rad."""

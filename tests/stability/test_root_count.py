@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from machines import random_machine
 
-from lathe_chatter.characteristic import CharacteristicEquation
 from lathe_chatter.model import Machine
-from lathe_chatter.root_count import UNDECIDED, count_right_of
 from lathe_chatter.stability import count_roots_right_of, critical_depth, leading_roots
+from lathe_chatter.stability.characteristic import CharacteristicEquation
+from lathe_chatter.stability.root_count import UNDECIDED, count_right_of
 
 
 @pytest.mark.parametrize('rpm', [60.0, 300.0, 1000.0, 3000.0, 12000.0])

@@ -11,8 +11,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lathe_chatter.characteristic import CharacteristicEquation, Complex, checked, polynomial
 from lathe_chatter.model import Array, Integers, Machine
+from lathe_chatter.stability.characteristic import (
+    CharacteristicEquation,
+    Complex,
+    checked,
+    polynomial,
+)
 
 UNDECIDED = -1
 """The count where the line passes through a root, within rounding."""

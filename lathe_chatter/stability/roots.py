@@ -13,15 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.characteristic import (
+from lathe_chatter.model import Array, Integers, Machine
+from lathe_chatter.quantities import Quantity
+from lathe_chatter.stability.characteristic import (
     CharacteristicEquation,
     Complex,
     checked,
     residual_tolerance,
 )
-from lathe_chatter.model import Array, Integers, Machine
-from lathe_chatter.quantities import Quantity
-from lathe_chatter.root_count import count_right_of
+from lathe_chatter.stability.root_count import count_right_of
 
 _ITERATIONS = 12
 _ITERATIONS_DENSE = 60

@@ -13,17 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.characteristic import CharacteristicEquation, Complex, checked
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lobes import (
+from lathe_chatter.model import Array, Machine
+from lathe_chatter.quantities import Quantity
+from lathe_chatter.stability.characteristic import CharacteristicEquation, Complex, checked
+from lathe_chatter.stability.lobes import (
     critical_depth,
     crossing_frequencies,
     damped_equation,
     echo_phase,
 )
-from lathe_chatter.model import Array, Machine
-from lathe_chatter.quantities import Quantity
-from lathe_chatter.roots import rightmost_roots
+from lathe_chatter.stability.roots import rightmost_roots
 
 _SAMPLES = 9
 _ZOOMS = 2

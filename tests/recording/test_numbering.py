@@ -1,0 +1,60 @@
+"""Losses told by numbers alone, against losses that the test made itself."""
+
+from __future__ import annotations
+
+import math
+import random
+
+from lathe_chatter.recording.numbering import Numbering
+
+
+def follow(numbers: list[int], publishers: int, *, kept: bool = False) -> int:
+    numbering = Numbering(kept=kept)
+    for k, number in enumerate(numbers):
+        numbering.take(number, now=0.01 * k)
+    numbering.settle(publishers, math.inf)
+    return numbering.lost
+
+
+def test_nothing_is_lost_where_every_number_follows() -> None:
+    assert follow(list(range(1, 1000)), 1) == 0
+
+
+def test_gaps_are_counted_message_by_message() -> None:
+    generator = random.Random(1)
+    kept = [n for n in range(1, 2001) if n in (1, 2000) or generator.random() > 0.1]
+    assert follow(kept, 1) == 2000 - len(kept)
+
+
+def test_what_was_published_before_is_lost_only_where_it_was_kept() -> None:
+    assert follow([50, 51, 52], 1, kept=True) == 49
+    assert follow([50, 51, 52], 1) == 0
+
+
+def test_publishers_that_take_turns_lose_nothing() -> None:
+    first, second, third = iter(range(1, 400)), iter(range(70, 400)), iter(range(9, 400))
+    generator = random.Random(2)
+    turns = [generator.choice((first, second, third)) for _ in range(300)]
+    assert follow([next(turn) for turn in turns], 3) == 0
+
+
+def test_a_publisher_that_joins_before_the_graph_knows_it_is_no_loss() -> None:
+    numbering = Numbering()
+    for k in range(100):
+        numbering.take(k + 1, now=0.01 * k)
+        if k >= 50:
+            numbering.take(k + 1000, now=0.01 * k)
+        numbering.settle(1 if k < 90 else 2, now=0.01 * k)
+    numbering.settle(2, math.inf)
+    assert numbering.lost == 0
+
+
+def test_a_publisher_that_was_started_again_is_no_loss() -> None:
+    assert follow([*range(1, 100), *range(1, 50)], 1) == 0
+
+
+def test_a_gap_of_one_publisher_among_others_is_found() -> None:
+    first = iter([*range(1, 50), *range(60, 150)])
+    second = iter(range(1000, 1200))
+    mixed = [number for pair in zip(first, second, strict=False) for number in pair]
+    assert follow(mixed, 2) == 10
