@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -13,6 +12,7 @@ import numpy as np
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.integrator import layout, propagation, stepper, surface
+from lathe_chatter.integrator.preparation import mechanics_of, steps_per_sample
 from lathe_chatter.model import (
     SAMPLE_COLUMNS,
     Array,
@@ -34,8 +34,6 @@ DISPLACEMENT_LIMIT = Quantity(
 )
 _STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)
 _IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
-_TURN_PER_STEP = 0.05
-_MOST_STEPS = 100_000
 
 
 class EventKind(IntEnum):
@@ -149,7 +147,7 @@ class VirtualLathe:
         self.events: list[Event] = []
         self._event_space: Array = np.empty((64, 3))
         self._state = self._fresh(cut or Cut(), initial_state)
-        self._choose_steps()
+        self._state.counts[layout.STEPS] = self._steps_for(self.cut, self._state)
         self._prepare()
 
     # -- what it is doing ----------------------------------------------------------------
@@ -231,12 +229,17 @@ class VirtualLathe:
         return out[:rows]
 
     def retune(self, cut: Cut) -> None:
-        """Change the cut at the instant of the last sample; nothing is restarted."""
+        """Change the cut at the instant of the last sample; nothing is restarted.
+
+        Raises:
+            ParameterError: If the machine with this cut is too fast for the sample rate; then
+                nothing has changed.
+        """
         if cut == self.cut:
             return
-        old = self.cut
+        old, steps = self.cut, self._steps_for(cut, self._state)
         self._state.cut = cut
-        self._choose_steps()
+        self._state.counts[layout.STEPS] = steps
         self._prepare()
         contact_changed = (cut.bearing_contact, cut.bearing_clearance) != (
             old.bearing_contact,
@@ -321,20 +324,7 @@ class VirtualLathe:
 
     def _prepare(self) -> None:
         """Turn machine and cut into the constants of the inner loop."""
-        machine, cut, state = self.machine, self.cut, self._state
-        tool, workpiece = machine.tool, machine.workpiece
-        cutting = machine.cutting_stiffness(cut.depth_of_cut)
-        mechanics = np.empty(propagation.MECHANICS_SIZE)
-        mechanics[propagation.TOOL_STIFFNESS] = tool.natural_frequency**2
-        mechanics[propagation.TOOL_DAMPING] = tool.damping / tool.mass
-        mechanics[propagation.TOOL_CUTTING] = cutting / tool.mass
-        mechanics[propagation.TOOL_COMPLIANCE] = 1.0 / tool.mass
-        mechanics[propagation.WORKPIECE_STIFFNESS] = workpiece.natural_frequency**2
-        mechanics[propagation.WORKPIECE_DAMPING] = workpiece.damping / workpiece.mass
-        mechanics[propagation.WORKPIECE_CUTTING] = cutting / workpiece.mass
-        mechanics[propagation.BEARING_STIFFNESS] = machine.bearing_stiffness / workpiece.mass
-        mechanics[propagation.CLEARANCE] = cut.bearing_clearance
-
+        cut, state = self.cut, self._state
         speed = cut.spindle_speed_rpm / 60.0
         if self.spindle_acceleration == 0.0:
             state.numbers[layout.SPEED] = speed
@@ -345,7 +335,7 @@ class VirtualLathe:
         settings[layout.VARIATION] = cut.speed_variation_amplitude
         settings[layout.VARIATION_FREQUENCY] = cut.speed_variation_frequency
         settings[layout.FEED_SPEED] = cut.feed_speed if self.tool_leaves_cut else 0.0
-        settings[layout.CUTTING_STIFFNESS] = cutting
+        settings[layout.CUTTING_STIFFNESS] = self.machine.cutting_stiffness(cut.depth_of_cut)
         settings[layout.NOMINAL_FEED_SPEED] = cut.feed_speed
         settings[layout.MAY_LEAVE_CUT] = self.tool_leaves_cut
         settings[layout.HAS_CLEARANCE] = cut.bearing_contact is BearingContact.GAP
@@ -353,29 +343,17 @@ class VirtualLathe:
         settings[layout.SENSOR_NOISE] = cut.sensor_noise
         settings[layout.RUNOUT] = cut.runout
         settings[layout.LIMIT] = self.displacement_limit
-        self._settings, self._mechanics = settings, mechanics
+        self._settings, self._mechanics = settings, mechanics_of(self.machine, cut)
         step = 1.0 / (self.sample_rate * state.counts[layout.STEPS])
-        self._matrices = propagation.step_matrices(step, mechanics)
+        self._matrices = propagation.step_matrices(step, self._mechanics)
 
-    def _choose_steps(self) -> None:
-        """Steps so short that the series converge and that a turn has many of them.
+    def _steps_for(self, cut: Cut, state: LatheState) -> int:
+        """Steps a sample for a cut that begins now.
 
         Chosen when the cut changes and then remembered: a restored run takes the same steps.
+
+        Raises:
+            ParameterError: If the machine is too fast for the sample rate.
         """
-        machine, cut, state = self.machine, self.cut, self._state
-        cutting = machine.cutting_stiffness(cut.depth_of_cut)
-        on_workpiece = machine.workpiece_stiffness(seated=True) + 2.0 * cutting
-        on_tool = machine.tool.stiffness + 2.0 * cutting
-        fastest = math.sqrt(
-            max(on_tool / machine.tool.mass, on_workpiece / machine.workpiece.mass)
-        )
         speed = max(cut.spindle_speed_rpm / 60.0, float(state.numbers[layout.SPEED]))
-        speed *= 1.0 + cut.speed_variation_amplitude
-        needed = max(fastest / propagation.RATE_STEP, speed / _TURN_PER_STEP)
-        if needed > _MOST_STEPS * self.sample_rate:
-            allowed = (
-                f'at least {needed / _MOST_STEPS:.0f} Hz for a machine with motions of up to '
-                f'{fastest:.0f} rad/s'
-            )
-            raise ParameterError('sample_rate', self.sample_rate, 'Hz', allowed)
-        state.counts[layout.STEPS] = max(1, math.ceil(needed / self.sample_rate))
+        return steps_per_sample(self.machine, cut, speed, self.sample_rate)

@@ -8,11 +8,30 @@ ends. Each piece between is solved exactly (propagation.py) and leaves a node of
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from lathe_chatter.compiled import compiled
-from lathe_chatter.integrator import layout, noise, propagation, surface
+from lathe_chatter.integrator import layout, propagation, surface
 from lathe_chatter.integrator.events import NEVER, first_crossing, may_turn_back
+from lathe_chatter.integrator.plan import (
+    ANGLE_1,
+    ANGLE_LOW_1,
+    BEND_0,
+    BEND_1,
+    CURVATURE_1,
+    DURATION,
+    FED_1,
+    FED_LOW_1,
+    HEIGHT_1,
+    MET_0,
+    MET_1,
+    RATE_0,
+    RATE_1,
+    SLOPE_1,
+    SPEED_1,
+    SPEED_SLOPE_1,
+    Scratch,
+    plan_piece,
+)
 from lathe_chatter.integrator.propagation import (
     ENGAGED,
     IN_CUT,
@@ -20,69 +39,12 @@ from lathe_chatter.integrator.propagation import (
     relative_acceleration,
     whole_step,
 )
-from lathe_chatter.integrator.spindle import speed_and_slope, time_to_turn, turned
+from lathe_chatter.integrator.spindle import speed_and_slope
 from lathe_chatter.model import Array, Integers
 
 _MOST_FLIPS = 32
 """Events in one step before it is finished without looking for more: a grazing contact that
 rounding cannot decide is no reason to stand still."""
-DETAIL = 1.5
-"""A piece may meet this many steps' worth of surface, as finely as that was cut."""
-
-
-class Scratch(NamedTuple):
-    """Room to work in, so that no piece has to ask for memory."""
-
-    piece: Array  # (PIECE_SIZE,)
-    end: Array  # state at the end of the piece (4,)
-    tool: Array  # power series of the piece (TERMS,)
-    workpiece: Array  # the same
-    hold: Array  # the quintic of the surface met (6,)
-    margin: Array  # of an event (TERMS,)
-
-
-# The surface at both ends of a piece, by time, and what belongs to its far end.
-(
-    MET_0, RATE_0, BEND_0, MET_1, RATE_1, BEND_1,  # m, m/s, m/s2
-    DURATION, ANGLE_1, ANGLE_LOW_1, FED_1, FED_LOW_1, SPEED_1, SPEED_SLOPE_1,
-    HEIGHT_1, SLOPE_1, CURVATURE_1,  # of the surface met there, by angle
-) = range(16)  # fmt: skip
-PIECE_SIZE = 16
-
-
-@compiled(inline=True)
-def add(high: float, low: float, increment: float) -> tuple[float, float]:
-    """Compensated addition: a turn of 10^5 steps sums as exactly as one step."""
-    increment += low
-    total = high + increment
-    return total, increment - (total - high)
-
-
-@compiled(inline=True)
-def write_sample(
-    out: Array, row: int, time: float, angle: float, xt: float, vt: float, xw: float, vw: float,
-    chip: float, force: float,
-) -> None:  # fmt: skip
-    """Write a sample, columns as in `model.SAMPLE_COLUMNS`."""
-    out[row, 0], out[row, 1] = time, angle
-    out[row, 2], out[row, 3], out[row, 4], out[row, 5] = xt, vt, xw, vw
-    out[row, 6], out[row, 7] = chip, force
-
-
-@compiled()
-def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: int) -> None:
-    """Add to a sample what sensors see beside the motion: runout and their own noise."""
-    turn = 2.0 * math.pi * (out[row, 1] % 1.0)
-    out[row, 4] += settings[layout.RUNOUT] * math.cos(turn)
-    out[row, 5] -= settings[layout.RUNOUT] * 2.0 * math.pi * speed * math.sin(turn)
-    if settings[layout.SENSOR_NOISE] > 0.0:
-        sample = round(out[row, 0] * settings[layout.SAMPLE_RATE])
-        out[row, 2] += settings[layout.SENSOR_NOISE] * noise.standard_normal(
-            seed, noise.TOOL_SENSOR_STREAM, sample
-        )
-        out[row, 4] += settings[layout.SENSOR_NOISE] * noise.standard_normal(
-            seed, noise.WORKPIECE_SENSOR_STREAM, sample
-        )
 
 
 @compiled(inline=True)
@@ -113,78 +75,6 @@ def _finish_corner(
     if order > 0:
         nodes[head, surface.ORDER] = min(nodes[head, surface.ORDER], order)
     counts[layout.CORNER] = counts[layout.SURFACE_CORNER] = 0
-
-
-@compiled(inline=True)
-def _plan(
-    numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, limit: float,
-    merge: float, piece: Array,
-) -> tuple[int, bool, bool]:  # fmt: skip
-    """Where a piece of at most `limit` s ends, and what the tool meets there, into `piece`.
-
-    Returns:
-        The node at or before the place met, whether it is just there, whether a ramp ends.
-    """
-    speed, phase = numbers[layout.SPEED], numbers[layout.PHASE]
-    variation = settings[layout.VARIATION]
-    frequency = settings[layout.VARIATION_FREQUENCY]
-    steady = slope == 0.0 and variation == 0.0
-    duration, ramp_ends = limit, False
-    if slope != 0.0:
-        to_target = (settings[layout.TARGET_SPEED] - speed) / slope
-        ramp_ends = to_target <= limit + merge
-        if to_target < limit - merge:
-            duration = to_target
-    rise = speed * duration
-    if not steady:
-        rise = turned(duration, speed, slope, variation, phase, frequency)
-    node = counts[layout.POINTER]
-    pitch = nodes[node + 1, surface.PITCH]
-    if rise > DETAIL * pitch:
-        duration, ramp_ends = duration * (0.8 * DETAIL * pitch / rise), False
-        rise = speed * duration
-        if not steady:
-            rise = turned(duration, speed, slope, variation, phase, frequency)
-    angle, angle_low = numbers[layout.ANGLE], numbers[layout.ANGLE_LOW]
-    piece[ANGLE_1], piece[ANGLE_LOW_1] = add(angle, angle_low, rise)
-    place, near, at_node = piece[ANGLE_1] - 1.0, merge * speed, False
-    while nodes[node + 1, surface.ANGLE] < place - near:
-        node += 1
-        if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
-            rise = nodes[node, surface.ANGLE] + 1.0 - angle - angle_low
-            duration, ramp_ends, at_node = rise / speed, False, True
-            if not steady:
-                duration = time_to_turn(rise, speed, slope, variation, phase, frequency)
-            piece[ANGLE_1], piece[ANGLE_LOW_1] = add(angle, angle_low, rise)
-            break
-    if not at_node and nodes[node + 1, surface.ANGLE] <= place + near:
-        node, at_node = node + 1, True
-
-    if at_node:
-        piece[HEIGHT_1] = nodes[node, surface.HEIGHT]
-        piece[SLOPE_1] = nodes[node, surface.SLOPE_BEFORE]
-        piece[CURVATURE_1] = nodes[node, surface.CURVATURE_BEFORE]
-    else:
-        piece[HEIGHT_1], piece[SLOPE_1], piece[CURVATURE_1] = surface.surface_at(
-            nodes, node, place
-        )
-    piece[DURATION] = duration
-    piece[SPEED_1], piece[SPEED_SLOPE_1] = speed, 0.0
-    if not steady:
-        piece[SPEED_1], piece[SPEED_SLOPE_1] = speed_and_slope(
-            speed + slope * duration, slope, variation, phase + frequency * duration, frequency
-        )
-    feed = settings[layout.FEED_SPEED]
-    piece[FED_1], piece[FED_LOW_1] = add(
-        numbers[layout.FED], numbers[layout.FED_LOW], feed * duration
-    )
-    piece[MET_1] = piece[HEIGHT_1] - piece[FED_1]
-    piece[RATE_1] = piece[SLOPE_1] * piece[SPEED_1] - feed
-    piece[BEND_1] = (
-        piece[CURVATURE_1] * piece[SPEED_1] * piece[SPEED_1]
-        + piece[SLOPE_1] * piece[SPEED_SLOPE_1]
-    )
-    return node, at_node, ramp_ends
 
 
 @compiled(inline=True)
@@ -381,7 +271,7 @@ def take_step(
             + numbers[layout.MET_SLOPE] * acceleration
         )
         regime, left = counts[layout.REGIME], numbers[layout.LEFT]
-        node, at_node, ramp_ends = _plan(
+        node, at_node, ramp_ends = plan_piece(
             numbers, counts, nodes, settings, slope, left, merge, piece
         )
         _solve(numbers, regime, mechanics, matrices, force, step, scratch)
@@ -392,7 +282,7 @@ def take_step(
             until = place * piece[DURATION]
             if merge < until < piece[DURATION] - merge:
                 # Inside: the piece ends here, and is solved again as short as it is.
-                node, at_node, ramp_ends = _plan(
+                node, at_node, ramp_ends = plan_piece(
                     numbers, counts, nodes, settings, slope, until, merge, piece
                 )
                 _solve(numbers, regime, mechanics, matrices, force, step, scratch)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from lathe_chatter.compiled import compiled
 from lathe_chatter.integrator import layout, surface
 from lathe_chatter.integrator.events import may_turn_back
-from lathe_chatter.integrator.pieces import DETAIL, add, write_sample
+from lathe_chatter.integrator.plan import DETAIL, add
 from lathe_chatter.integrator.propagation import (
     CLEARANCE,
     ENGAGED,
@@ -18,6 +18,7 @@ from lathe_chatter.integrator.propagation import (
     relative_acceleration,
     whole_step,
 )
+from lathe_chatter.integrator.samples import write_sample
 from lathe_chatter.model import Array, Integers
 
 

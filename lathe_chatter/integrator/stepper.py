@@ -15,37 +15,13 @@ import numpy as np
 
 from lathe_chatter.compiled import compiled
 from lathe_chatter.integrator import layout, noise
-from lathe_chatter.integrator.pieces import (
-    PIECE_SIZE,
-    Scratch,
-    add_measurement,
-    take_step,
-    write_sample,
-)
-from lathe_chatter.integrator.propagation import IN_CUT, TERMS
+from lathe_chatter.integrator.pieces import take_step
+from lathe_chatter.integrator.plan import PIECE_SIZE, Scratch
+from lathe_chatter.integrator.propagation import TERMS
 from lathe_chatter.integrator.quiet import take_quiet_steps
+from lathe_chatter.integrator.samples import add_measurement, write_present
 from lathe_chatter.integrator.spindle import speed_and_slope
 from lathe_chatter.model import Array, Integers
-
-
-@compiled()
-def _write_present(
-    numbers: Array, counts: Integers, settings: Array, out: Array, row: int
-) -> None:
-    """Count and write the sample of the present state."""
-    counts[layout.SAMPLES] += 1
-    xt, xw = numbers[layout.TOOL_X], numbers[layout.WORKPIECE_X]
-    chip = xt - xw - (numbers[layout.MET] - numbers[layout.FED])
-    in_cut = counts[layout.REGIME] & IN_CUT != 0
-    thickness = chip + settings[layout.NOMINAL_FEED_SPEED] / numbers[layout.SPEED]
-    if settings[layout.MAY_LEAVE_CUT] != 0.0:
-        thickness = max(chip, 0.0)
-    write_sample(
-        out, row, counts[layout.SAMPLES] / settings[layout.SAMPLE_RATE],
-        counts[layout.TURNS] + numbers[layout.ANGLE],
-        xt, numbers[layout.TOOL_V], xw, numbers[layout.WORKPIECE_V],
-        thickness, settings[layout.CUTTING_STIFFNESS] * chip if in_cut else 0.0,
-    )  # fmt: skip
 
 
 @compiled(nogil=True)
@@ -112,7 +88,7 @@ def advance(
             xt, xw = numbers[layout.TOOL_X], numbers[layout.WORKPIECE_X]
             if not (abs(xt) <= settings[layout.LIMIT] and abs(xw) <= settings[layout.LIMIT]):
                 return row, found, layout.GUARD
-            _write_present(numbers, counts, settings, out, row)
+            write_present(numbers, counts, settings, out, row)
             if measured:
                 speed, _ = speed_and_slope(
                     numbers[layout.SPEED], 0.0, settings[layout.VARIATION],

@@ -3,30 +3,46 @@
 from __future__ import annotations
 
 import re
-import struct
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.model import Array
+from lathe_chatter.recording.recorded_file import Note, RecordedFile
+from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
+from lathe_chatter.recording.sample_series import Samples, joined
+from lathe_chatter.recording.scan import Damage
 
 _SPLIT = re.compile(r'_(\d+)\.mcap$')
 
 
-_DAMAGE = (McapError, ValueError, RuntimeError, EOFError, struct.error)
-"""What readers raise on a damaged file: mcap's own, a CRC, lz4's, too few bytes."""
-
-
 class RunReadError(LatheChatterError):
     """A path that holds no run that can be read; the text says why."""
+
+
+class Raw(NamedTuple):
+    """A message as it was recorded.
+
+    Attributes:
+        topic: Its name.
+        type: As `std_msgs/msg/Bool`.
+        log_time: When it was received, ns since the epoch.
+        publish_time: When it was published, ns since the epoch.
+        sequence: Its number among those of its publisher; 0 from writers that keep none.
+        data: CDR.
+    """
+
+    topic: str
+    type: str
+    log_time: int
+    publish_time: int
+    sequence: int
+    data: bytes
 
 
 class Recorded(NamedTuple):
@@ -45,117 +61,146 @@ class Recorded(NamedTuple):
     message: Any
 
 
-class Samples(NamedTuple):
-    """The samples of one lathe.
-
-    Attributes:
-        columns: Each signal by name (n,), SI.
-        log_times: When each block was received, ns since the epoch (blocks,).
-        block_ends: Simulated time of the last sample of each block, s (blocks,).
-        gaps: Where samples are missing: simulated times before and after, s.
-    """
-
-    columns: dict[str, Array]
-    log_times: np.ndarray[Any, np.dtype[np.int64]]
-    block_ends: Array
-    gaps: list[tuple[float, float]]
-
-    def simulated_time(self, log_time: int) -> float:
-        """Simulated time when something else was recorded, s: that of the blocks about it."""
-        relative = (self.log_times - self.log_times[0]).astype(float)
-        return float(np.interp(float(log_time - self.log_times[0]), relative, self.block_ends))
-
-
 @dataclass(frozen=True)
 class Run:
-    """A recorded run; nothing is read before it is asked for.
+    """A recorded run; nothing is read before it is asked for, and everything read has its CRC.
 
     Attributes:
         path: As it was given.
         files: The MCAP files in order.
+        damaged: Whether what is left of damaged files is wanted; else they raise.
+        damage: What could not be read so far, where `damaged`.
     """
 
     path: Path
     files: tuple[Path, ...]
+    damaged: bool = False
+    damage: list[Damage] = field(default_factory=list)
 
     @cached_property
     def topics(self) -> dict[str, str]:
-        """The type of each topic by name."""
+        """The type of each topic by name.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
         found: dict[str, str] = {}
-        for file in self.files:
-            try:
-                with file.open('rb') as stream:
-                    summary = make_reader(stream).get_summary()
-            except _DAMAGE as error:
-                raise RunReadError(f'{file} is damaged: {error}.') from None
-            if summary is None:
-                raise RunReadError(f'{file} has no summary: it is damaged or no MCAP file.')
-            for channel in summary.channels.values():
-                found[channel.topic] = summary.schemas[channel.schema_id].name
+        for file in self._opened():
+            if not file.has_summary:
+                self._on_damage(Damage(file.path, 0, 0, 'it has no sound summary at its end'))
+            found |= file.topics()
         return found
 
+    def notes(self) -> list[Note]:
+        """What was noted beside the messages, in every file, in order."""
+        return [note for file in self._opened() for note in file.notes()]
+
+    def raw_messages(self, *topics: str) -> Iterator[Raw]:
+        """The messages of some topics, or of all if none is named, as they are in the file.
+
+        In order of reception, also where chunks overlap.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
+        for file in self._opened():
+            waiting: list[Raw] = []
+            for contents in file.contents():
+                ready = [raw for raw in waiting if raw.log_time < contents.first]
+                if ready:
+                    yield from ready
+                    waiting = waiting[len(ready) :]
+                found = _raw(file, contents.messages, topics)
+                waiting = sorted([*waiting, *found], key=lambda raw: raw.log_time)
+            yield from waiting
+
     def messages(self, *topics: str) -> Iterator[Recorded]:
-        """The messages of some topics in order of reception.
+        """The messages of some topics in order of reception, decoded.
 
         Raises:
             RunReadError: If a file is damaged.
         """
         store = get_typestore(Stores.ROS2_JAZZY)
         known = set(store.fielddefs)
-        for file in self.files:
-            with file.open('rb') as stream:
-                reader = make_reader(stream, validate_crcs=True)
-                try:
-                    for schema, channel, message in reader.iter_messages(topics=list(topics)):
-                        if schema is None:
-                            continue
-                        if schema.name not in known:
-                            store.register(get_types_from_msg(schema.data.decode(), schema.name))
-                            known.add(schema.name)
-                        yield Recorded(
-                            channel.topic,
-                            message.log_time,
-                            message.sequence,
-                            store.deserialize_cdr(message.data, schema.name),
-                        )
-                except _DAMAGE as error:
-                    raise RunReadError(f'{file} is damaged: {error}.') from None
+        for raw in self.raw_messages(*topics):
+            if raw.type not in known:
+                definition = self._definition(raw.type)
+                store.register(get_types_from_msg(definition, raw.type))
+                known.add(raw.type)
+            message = store.deserialize_cdr(raw.data, raw.type)
+            yield Recorded(raw.topic, raw.log_time, raw.sequence, message)
 
-    def samples(self, topic: str | None = None) -> Samples:
+    def sample_blocks(self, topic: str | None = None) -> Iterator[Blocks]:
+        """The samples of a lathe as they were recorded, some 0.25 s at a time.
+
+        Raises:
+            RunReadError: If a file is damaged, or there are several lathes and no topic is named.
+            LayoutError: If a message is no block of samples.
+        """
+        name = topic or self._only_samples()
+        for file in self._opened():
+            for contents in file.contents():
+                for number in [n for n, c in file.known.channels.items() if c.topic == name]:
+                    yield from blocks_of(contents.messages.of(number))
+
+    def samples(
+        self,
+        topic: str | None = None,
+        *,
+        columns: Iterable[str] | None = None,
+        start: float = -np.inf,
+        end: float = np.inf,
+    ) -> Samples:
         """The samples of a lathe, joined.
 
         Args:
             topic: Of the samples; may be left out where the run has one lathe.
+            columns: Which signals; all by default.
+            start: Simulated time of the first wanted, s.
+            end: Simulated time of the last wanted, s.
 
         Raises:
-            RunReadError: If there are none, or several lathes and no topic is named.
+            RunReadError: If a file is damaged, there are no samples, no such columns, or several
+                lathes and no topic is named.
+            LayoutError: If a message is no block of samples.
         """
         name = topic or self._only_samples()
-        blocks: list[Array] = []
-        log_times: list[int] = []
-        labels: tuple[str, ...] = ()
-        for recorded in self.messages(name):
-            layout = recorded.message.layout
-            labels = tuple(layout.dim[1].label.split(','))
-            blocks.append(np.asarray(recorded.message.data).reshape(-1, len(labels)))
-            log_times.append(recorded.log_time)
-        if not blocks:
+        wanted = None if columns is None else tuple(columns)
+        expected = sum(file.count(name) for file in self._opened())
+        found = joined(self.sample_blocks(name), expected, wanted, start, end)
+        if found is None:
             raise RunReadError(f'{self.path} holds no samples of {name}.')
-        joined = np.concatenate(blocks)
-        time = labels.index('time')
-        ends = np.array([block[-1, time] for block in blocks])
-        starts = np.array([block[0, time] for block in blocks])
-        step = float(np.median(np.diff(joined[:, time]))) if len(joined) > 1 else 0.0
-        broken = np.flatnonzero(np.abs(starts[1:] - ends[:-1] - step) > 0.5 * step)
-        return Samples(
-            {label: joined[:, place] for place, label in enumerate(labels)},
-            np.array(log_times, dtype=np.int64),
-            ends,
-            [(float(ends[place]), float(starts[place + 1])) for place in broken],
-        )
+        if wanted is not None and set(wanted) - set(found.columns):
+            missing = ', '.join(sorted(set(wanted) - set(found.columns)))
+            raise RunReadError(f'The samples of {name} in {self.path} have no column {missing}.')
+        return found
+
+    def _opened(self) -> Iterator[RecordedFile]:
+        for path in self.files:
+            yield RecordedFile(path, self._on_damage)
+
+    def _on_damage(self, damage: Damage) -> None:
+        if not self.damaged:
+            raise RunReadError(
+                f'{damage.file} is damaged at byte {damage.start}: {damage.reason}. What is left '
+                'of it can be saved by `lathe-chatter recover`.'
+            )
+        if damage not in self.damage:
+            self.damage.append(damage)
+
+    def _definition(self, kind: str) -> str:
+        for file in self._opened():
+            for schema in file.known.schemas.values():
+                if schema.name == kind:
+                    return str(schema.data.decode())
+        raise RunReadError(f'{self.path} does not say what a {kind} is.')
 
     def _only_samples(self) -> str:
-        names = sorted(name for name in self.topics if name.endswith('/samples'))
+        names = sorted(
+            name
+            for name, kind in self.topics.items()
+            if name.endswith('/samples') and kind == SAMPLES_TYPE
+        )
         if not names:
             raise RunReadError(f'{self.path} holds no samples of a lathe.')
         if len(names) > 1:
@@ -163,23 +208,45 @@ class Run:
         return names[0]
 
 
-def read_run(path: Path | str) -> Run:
+def _raw(file: RecordedFile, messages: Any, topics: tuple[str, ...]) -> Iterator[Raw]:
+    """The messages of a chunk that are of some topics."""
+    channels = file.known.channels
+    for place, head in enumerate(messages.heads):
+        channel = channels.get(int(head['channel']))
+        if channel is None or (topics and channel.topic not in topics):
+            continue
+        schema = file.known.schemas.get(channel.schema_id)
+        if schema is None:
+            continue
+        yield Raw(
+            channel.topic,
+            schema.name,
+            int(head['log_time']),
+            int(head['publish_time']),
+            int(head['sequence']),
+            messages.payload(place),
+        )
+
+
+def read_run(path: Path | str, *, damaged: bool = False) -> Run:
     """Open a recorded run.
 
     Args:
         path: A rosbag2 folder with MCAP files, or one MCAP file.
+        damaged: Whether to hand out what is left of damaged files, instead of raising; what is
+            missing is then in `Run.damage`, and among the gaps of the samples.
 
     Raises:
         RunReadError: If there is no such run.
     """
     path = Path(path)
     if path.is_file():
-        return Run(path, (path,))
+        return Run(path, (path,), damaged)
     files = [file for file in path.glob('*.mcap') if _SPLIT.search(file.name)]
     if not files:
         what = 'holds no recorded run' if path.is_dir() else 'does not exist'
         raise RunReadError(f'{path} {what}.')
-    return Run(path, tuple(sorted(files, key=_split_number)))
+    return Run(path, tuple(sorted(files, key=_split_number)), damaged)
 
 
 def _split_number(file: Path) -> int:

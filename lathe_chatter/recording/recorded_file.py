@@ -1,0 +1,113 @@
+"""One MCAP file of a run: its messages chunk by chunk, and what of it is damaged."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
+
+from lathe_chatter.recording.chunk_messages import Messages, messages_of
+from lathe_chatter.recording.scan import Chunk, Damage, Plain, Wanted, scan
+from lathe_chatter.recording.summary import Summary, add_record, read_summary
+
+_UNREADABLE = (ValueError, EndOfFile, struct.error)
+"""What parsing a record raises whose content is not of its kind."""
+
+
+class Note(NamedTuple):
+    """Named values that were kept beside the messages."""
+
+    name: str
+    values: dict[str, str]
+
+
+class Contents(NamedTuple):
+    """The messages of one chunk.
+
+    Attributes:
+        first: Earliest log time, ns.
+        messages: All of them.
+    """
+
+    first: int
+    messages: Messages
+
+
+class RecordedFile:
+    """A file that is walked when it is asked.
+
+    Args:
+        path: Of the file.
+        on_damage: Told of every part that cannot be read; it may raise.
+
+    Attributes:
+        known: Schemas and channels, as far as they have been met.
+    """
+
+    def __init__(self, path: Path, on_damage: Callable[[Damage], None]) -> None:
+        """Read the end of the file, where schemas and channels stand together."""
+        self.path = path
+        self._on_damage = on_damage
+        summary = read_summary(path)
+        self.has_summary = summary is not None
+        self.known = summary or Summary(0)
+
+    def topics(self) -> dict[str, str]:
+        """The type of each topic by name; a file without a summary is walked for it."""
+        if not self.has_summary:
+            for _ in self.contents():
+                pass
+        return {
+            channel.topic: self.known.schemas[channel.schema_id].name
+            for channel in self.known.channels.values()
+            if channel.schema_id in self.known.schemas
+        }
+
+    def contents(self, wanted: Wanted | None = None) -> Iterator[Contents]:
+        """The messages of each sound chunk; schemas and channels are known before they come."""
+        for found in scan(self.path, wanted):
+            if isinstance(found, Chunk):
+                contents = self._opened(found)
+                if contents is not None:
+                    yield contents
+            elif isinstance(found, Damage):
+                self._on_damage(found)
+            elif found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._learn(found.opcode, found.content)
+
+    def notes(self) -> Iterator[Note]:
+        """Every note, in order."""
+        for found in self._plain(Opcode.METADATA):
+            record = Metadata.read(found)
+            yield Note(record.name, dict(record.metadata))
+
+    def attachments(self) -> Iterator[Any]:
+        """Every attachment, as mcap has it, in order."""
+        for found in self._plain(Opcode.ATTACHMENT):
+            yield Attachment.read(found)
+
+    def _plain(self, opcode: int) -> Iterator[Any]:
+        for found in scan(self.path, lambda _first, _last: False):
+            if isinstance(found, Plain) and found.opcode == opcode:
+                yield ReadDataStream(BytesIO(found.content))
+
+    def _opened(self, chunk: Chunk) -> Contents | None:
+        try:
+            messages = messages_of(chunk)
+            for offset in messages.others:
+                opcode, length = struct.unpack_from('<BQ', chunk.records, offset)
+                self._learn(opcode, chunk.records[offset + 9 : offset + 9 + length])
+        except _UNREADABLE as error:
+            self._on_damage(Damage(self.path, chunk.offset, chunk.offset, str(error)))
+            return None
+        return Contents(chunk.first, messages)
+
+    def _learn(self, opcode: int, content: bytes) -> None:
+        add_record(self.known, opcode, content)

@@ -1,0 +1,241 @@
+"""An MCAP file chunk by chunk, whole or damaged: what is handed out has passed its CRC.
+
+Records are walked one after the other, which needs no index and so works just as well on a file
+without an end. Where the walk meets what cannot be a record it goes back to the last chunk that
+was sound and looks for the next one from there, byte by byte.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import lz4.frame
+import zstandard
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
+_HEAD = struct.Struct('<BQ')
+_CHUNK = struct.Struct('<QQQII')
+"""First and last log time, size and CRC of the records, length of the compression's name."""
+_INDEX = struct.Struct('<HI')
+_SIZES = {Opcode.DATA_END: 4, Opcode.FOOTER: 20}
+_SIGNS = (b'\x03\x00\x00\x00lz4', b'\x04\x00\x00\x00zstd')
+"""What a compressed chunk has after its other fields, which makes it easy to find."""
+_BEFORE_SIGN = _HEAD.size + _CHUNK.size - 4
+
+Wanted = Callable[[int, int], bool]
+"""Whether a chunk is wanted, by its first and last log time in ns."""
+
+
+class Chunk(NamedTuple):
+    """A sound chunk.
+
+    Attributes:
+        offset: Where it begins in its file.
+        first: Earliest log time, ns.
+        last: Latest log time, ns.
+        records: Uncompressed.
+        indexes: Raw message indexes by channel, as far as they follow it.
+    """
+
+    offset: int
+    first: int
+    last: int
+    records: bytes
+    indexes: dict[int, bytes]
+
+
+class Plain(NamedTuple):
+    """A record outside of chunks: its opcode and content."""
+
+    opcode: int
+    content: bytes
+
+
+class Damage(NamedTuple):
+    """A part of a file that cannot be read.
+
+    Attributes:
+        file: Which.
+        start: First byte.
+        end: Byte after the last; equal to `start` where something is missing altogether.
+        reason: What is wrong, as a phrase.
+    """
+
+    file: Path
+    start: int
+    end: int
+    reason: str
+
+    def __str__(self) -> str:
+        """One sentence."""
+        return f'{self.file.name}, bytes {self.start} to {self.end}: {self.reason}.'
+
+
+class _BadChunkError(Exception):
+    """A chunk that does not pass; the text is the phrase of a `Damage`."""
+
+
+def scan(file: Path, wanted: Wanted | None = None) -> Iterator[Chunk | Plain | Damage]:
+    """Walk the data section of a file.
+
+    Args:
+        file: MCAP.
+        wanted: Chunks that it says no to are passed by, unread.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    descriptor = os.open(file, os.O_RDONLY)
+    try:
+        yield from _Walk(file, descriptor, wanted).run()
+    finally:
+        os.close(descriptor)
+
+
+class _Walk:
+    def __init__(self, file: Path, descriptor: int, wanted: Wanted | None) -> None:
+        self._file = file
+        self._descriptor = descriptor
+        self._size = os.fstat(descriptor).st_size
+        self._wanted = wanted
+        self._sound = 0  # up to here nothing is in doubt
+
+    def run(self) -> Iterator[Chunk | Plain | Damage]:
+        """Every record in order, and every damage where it is."""
+        position = len(MCAP0_MAGIC)
+        if self._read(0, position) != MCAP0_MAGIC:
+            yield Damage(self._file, 0, position, 'this is not the beginning of an MCAP file')
+        while True:
+            found = self._head(position)
+            if found is None and position >= self._size:
+                yield Damage(self._file, self._size, self._size, 'the end of the file is missing')
+                return
+            if found is None:
+                start, position = self._sound or position, self._next_chunk()
+                reason = 'what is here cannot be read'
+                yield Damage(self._file, start, position, reason)
+                if position >= self._size:
+                    return
+                continue
+            opcode, length = found
+            end = position + _HEAD.size + length
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                return
+            if opcode == Opcode.CHUNK:
+                try:
+                    chunk, end = self._chunk(position, length)
+                except _BadChunkError as error:
+                    yield Damage(self._file, position, end, str(error))
+                else:
+                    self._sound = end
+                    if chunk is not None:
+                        yield chunk
+            else:
+                yield Plain(opcode, self._read(position + _HEAD.size, length))
+            position = end
+
+    def _read(self, offset: int, size: int) -> bytes:
+        return os.pread(self._descriptor, size, offset)
+
+    def _head(self, position: int) -> tuple[int, int] | None:
+        """Opcode and length of the record at a place, or None where none can be."""
+        head = self._read(position, _HEAD.size)
+        if len(head) < _HEAD.size:
+            return None
+        opcode, length = _HEAD.unpack(head)
+        possible = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80  # private
+        if not possible or position + _HEAD.size + length > self._size:
+            return None
+        if length != _SIZES.get(opcode, length):
+            return None
+        if opcode == Opcode.CHUNK and self._parts(position, length) is None:
+            return None
+        return opcode, length
+
+    def _parts(self, position: int, length: int) -> tuple[int, int, int, int, str, int] | None:
+        """The fields of a chunk before its data, and where that begins; None if they disagree."""
+        head = self._read(position + _HEAD.size, _CHUNK.size + 64)
+        if len(head) < _CHUNK.size:
+            return None
+        first, last, size, crc, letters = _CHUNK.unpack_from(head)
+        data = _CHUNK.size + letters + 8
+        if letters > 16 or data > len(head):  # no name is so long
+            return None
+        (stored,) = struct.unpack_from('<Q', head, data - 8)
+        if data + stored != length:
+            return None
+        name = head[_CHUNK.size : _CHUNK.size + letters].decode('ascii', 'replace')
+        return first, last, size, crc, name, position + _HEAD.size + data
+
+    def _chunk(self, position: int, length: int) -> tuple[Chunk | None, int]:
+        """The chunk at a place with its indexes, None if it is not wanted, and where they end.
+
+        Raises:
+            _BadChunkError: If its data are not what was written.
+        """
+        end = position + _HEAD.size + length
+        parts = self._parts(position, length)
+        if parts is None:
+            raise _BadChunkError('the head of a chunk is damaged')
+        first, last, size, crc, name, data = parts
+        if self._wanted is not None and not self._wanted(first, last):
+            return None, end
+        records = _decompressed(self._read(data, end - data), name, size)
+        if crc and zlib.crc32(records) != crc:
+            raise _BadChunkError('a chunk does not have its CRC')
+        indexes: dict[int, bytes] = {}
+        while (found := self._head(end)) is not None and found[0] == Opcode.MESSAGE_INDEX:
+            content = self._read(end + _HEAD.size, found[1])
+            if len(content) < _INDEX.size:
+                break
+            indexes[_INDEX.unpack_from(content)[0]] = content[_INDEX.size :]
+            end += _HEAD.size + found[1]
+        return Chunk(position, first, last, records, indexes), end
+
+    def _next_chunk(self) -> int:
+        """Where the next possible chunk begins after what is sound, or the end of the file."""
+        start = self._sound
+        data = self._read(start, self._size - start)
+        place = 0
+        while True:
+            signs = [p for p in (data.find(sign, place) for sign in _SIGNS) if p >= 0]
+            if not signs:
+                self._sound = self._size
+                return self._size
+            place = min(signs) + 1
+            position = start + min(signs) - _BEFORE_SIGN
+            if position >= start and self._data_opcode(position):
+                self._sound = position + 1  # should it be bad too, the next search goes on
+                return position
+
+    def _data_opcode(self, position: int) -> bool:
+        found = self._head(position)
+        return found is not None and found[0] == Opcode.CHUNK
+
+
+def _decompressed(data: bytes, name: str, size: int) -> bytes:
+    """The records of a chunk.
+
+    Raises:
+        _BadChunkError: If there is no such compression, or the data are not of it.
+    """
+    try:
+        if name == 'lz4':
+            records: bytes = lz4.frame.decompress(data)
+        elif name == 'zstd':
+            records = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+        elif name == '':
+            records = data
+        else:
+            raise _BadChunkError(f'a chunk is compressed as {name!r}, which is not known')
+    except (RuntimeError, zstandard.ZstdError, MemoryError):
+        raise _BadChunkError('a chunk cannot be decompressed') from None
+    if len(records) != size:
+        raise _BadChunkError('a chunk has not its size')
+    return records

@@ -1,0 +1,92 @@
+"""What the end of an MCAP file says about it, if it is whole."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema, Statistics
+from mcap.writer import MCAP0_MAGIC
+
+_FOOTER = struct.Struct('<BQQQI')
+_HEAD = struct.Struct('<BQ')
+
+
+@dataclass
+class Summary:
+    """Schemas and channels by number, and the statistics.
+
+    Attributes:
+        start: Where it begins in the file.
+        schemas: By number.
+        channels: By number.
+        statistics: None where the writer made none.
+    """
+
+    start: int
+    schemas: dict[int, Any] = field(default_factory=dict)
+    channels: dict[int, Any] = field(default_factory=dict)
+    statistics: Any = None
+
+
+def read_summary(file: Path) -> Summary | None:
+    """The summary of a file, None if there is none that passes its CRC.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    length = _FOOTER.size + len(MCAP0_MAGIC)
+    with file.open('rb') as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if size < length:
+            return None
+        stream.seek(size - length)
+        end = stream.read(length)
+        opcode, footer, start, _, crc = _FOOTER.unpack_from(end)
+        if not end.endswith(MCAP0_MAGIC) or (opcode, footer) != (Opcode.FOOTER, 20):
+            return None
+        if not 0 < start <= size - length:
+            return None
+        stream.seek(start)
+        data = stream.read(size - length - start)
+    if crc and zlib.crc32(end[: _FOOTER.size - 4], zlib.crc32(data)) != crc:
+        return None
+    try:
+        return _parsed(data, start)
+    except (struct.error, ValueError, EOFError):
+        return None
+
+
+def _parsed(data: bytes, start: int) -> Summary:
+    summary = Summary(start)
+    place = 0
+    while place < len(data):
+        opcode, length = _HEAD.unpack_from(data, place)
+        place += _HEAD.size
+        add_record(summary, opcode, data[place : place + length])
+        place += length
+    return summary
+
+
+def add_record(summary: Summary, opcode: int, content: bytes) -> None:
+    """Add what a record says, wherever in the file it stands.
+
+    Raises:
+        ValueError: If its content is not of its kind.
+    """
+    stream = ReadDataStream(BytesIO(content))
+    if opcode == Opcode.SCHEMA:
+        schema = Schema.read(stream)
+        summary.schemas[schema.id] = schema
+    elif opcode == Opcode.CHANNEL:
+        channel = Channel.read(stream)
+        summary.channels[channel.id] = channel
+    elif opcode == Opcode.STATISTICS:
+        summary.statistics = Statistics.read(stream)
