@@ -22,13 +22,12 @@ def _root(series: Array, terms: int, sign: float, low: float, high: float) -> fl
             low = place
         else:
             high = place
-        slope = sign * slope_at(series, terms, place)
-        following = place - value / slope if slope != 0.0 else low - 1.0
-        if not low < following < high:  # Newton has left the bracket
-            following = 0.5 * (low + high)
-        if abs(following - place) <= _CLOSE:
-            return following
-        place = following
+        step = value / (sign * slope_at(series, terms, place))
+        if abs(step) <= _CLOSE or high - low <= _CLOSE:
+            break
+        place -= step
+        if not low < place < high:  # Newton has left the bracket, or the slope is zero
+            place = 0.5 * (low + high)
     return place
 
 

@@ -23,6 +23,7 @@ from lathe_chatter.model import Array
 
 TERMS = 14
 """Coefficients of a series: 0.12^14/14! is 1e-24."""
+_SCALE = np.array([1.0 / ((k + 1.0) * (k + 2.0)) for k in range(TERMS - 2)])
 RATE_STEP = 0.12
 """Largest |lambda| dt of a step, see `TERMS`."""
 
@@ -108,9 +109,8 @@ def solve_piece(
         pull_workpiece = push_workpiece - workpiece_spring * workpiece[k] + on_workpiece * chip
         push_tool = 0.0
         push_workpiece = 0.0
-        scale = 1.0 / ((k + 1.0) * (k + 2.0))
-        tool[k + 2] = scale * (square * pull_tool - tool_damping * (k + 1.0) * tool[k + 1])
-        workpiece[k + 2] = scale * (
+        tool[k + 2] = _SCALE[k] * (square * pull_tool - tool_damping * (k + 1.0) * tool[k + 1])
+        workpiece[k + 2] = _SCALE[k] * (
             square * pull_workpiece - workpiece_damping * (k + 1.0) * workpiece[k + 1]
         )
 
