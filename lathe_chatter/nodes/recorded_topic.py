@@ -37,7 +37,7 @@ class RecordedTopic:
 
     Attributes:
         messages: How many came.
-        numbering: Says how many did not.
+        numbering: Says which did not.
     """
 
     def __init__(
@@ -46,11 +46,17 @@ class RecordedTopic:
         """Subscribe."""
         self.topic = topic
         self.messages = 0
-        self.numbering = Numbering(kept=all(_keeps(offer.qos_profile) for offer in offers))
+        self.numbering = Numbering()
+        self._kept = all(_keeps(offer.qos_profile) for offer in offers)
         self._node = node
         self._write = write
         self._class = _message_class(topic.type)
         self._subscribe(_matching(offers))
+
+    @property
+    def lost(self) -> int:
+        """Messages that are missing: also before the first, where publishers keep them."""
+        return self.numbering.lost + (self.numbering.before if self._kept else 0)
 
     def look(self, offers: list[TopicEndpointInfo]) -> None:
         """Follow the graph: new publishers may offer less than those before."""

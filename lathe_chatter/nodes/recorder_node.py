@@ -79,7 +79,11 @@ class RecorderNode(ParameterNode):
 
     def lost_of(self, name: str) -> int:
         """How many of its messages are known to be missing."""
-        return self._topics[name].numbering.lost if name in self._topics else 0
+        return self._topics[name].lost if name in self._topics else 0
+
+    def parameters_noted(self, node: str) -> bool:
+        """Whether the parameters of a node, by its full name, are in the run."""
+        return node in self._noted
 
     def start(self) -> Path:
         """Begin a run.
@@ -104,6 +108,7 @@ class RecorderNode(ParameterNode):
         self._failure = ''
         self._topics.clear()
         self._refused.clear()
+        self._noted: set[str] = set()
         self._snapshots = ParameterSnapshots(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
         self._writer.note(IDENTITY, {**identity(), 'middleware': middleware})
@@ -185,6 +190,7 @@ class RecorderNode(ParameterNode):
         if self._writer is not None:
             values = {'parameters': json.dumps(parameters), 'log_time': str(time.time_ns())}
             self._writer.note(PARAMETERS + node, values)
+            self._noted.add(node)
 
     # -- what is done with it --------------------------------------------------------------
 

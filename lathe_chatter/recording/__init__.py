@@ -1,6 +1,20 @@
 """A run on disk: a rosbag2 folder of MCAP files that open whatever happened to their writer."""
 
-from lathe_chatter.recording.reader import Run, read_run
+from lathe_chatter.recording.reader import Run, RunReadError, Samples, read_run
+from lathe_chatter.recording.recover import Recovery, recover
+from lathe_chatter.recording.verify import Finding, Verification, verify
 from lathe_chatter.recording.writer import RunWriter, Topic
 
-__all__ = ['Run', 'RunWriter', 'Topic', 'read_run']
+__all__ = [
+    'Finding',
+    'Recovery',
+    'Run',
+    'RunReadError',
+    'RunWriter',
+    'Samples',
+    'Topic',
+    'Verification',
+    'read_run',
+    'recover',
+    'verify',
+]

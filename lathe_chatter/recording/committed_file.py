@@ -87,7 +87,8 @@ class CommittedFile:
         """Make the file and commit its empty beginning."""
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
         self._sync = BackgroundSync(self._descriptor)
-        self._chunk = OpenChunk()
+        self._described: dict[int, bytes] = {}
+        self._chunk = OpenChunk(self._described)
         self._schemas: list[bytes] = []
         self._channels: list[bytes] = []
         self._chunk_indexes = bytearray()
@@ -110,7 +111,6 @@ class CommittedFile:
         number = len(self._schemas) + 1
         schema = Schema(id=number, name=name, encoding=encoding, data=data)
         self._schemas.append(record_bytes(schema))
-        self._chunk.add(schema)
         return number
 
     def add_channel(self, topic: str, schema: int, metadata: Mapping[str, str]) -> int:
@@ -124,7 +124,7 @@ class CommittedFile:
             schema_id=schema,
         )
         self._channels.append(record_bytes(channel))
-        self._chunk.add(channel)
+        self._described[number] = self._schemas[schema - 1] + self._channels[-1]
         return number
 
     def add_message(
@@ -223,7 +223,7 @@ class CommittedFile:
         self._body += chunk.data
         self._chunk_indexes += chunk.index
         self._contents = self._contents.with_chunk(chunk)
-        self._chunk = OpenChunk()
+        self._chunk = OpenChunk(self._described)
 
     def _summary(self, crc: int) -> bytes:
         """The end of the file: summary and footer, with the CRC of the body before."""

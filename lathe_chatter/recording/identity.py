@@ -16,6 +16,9 @@ PARAMETERS = 'lathe_chatter/parameters'
 RECEPTION = 'lathe_chatter/reception'
 """Name of the record of what came and what was lost on the way, by topic, as JSON."""
 
+RECOVERED = 'lathe_chatter/recovered'
+"""Name of the record of a run that was recovered: from which, and what could not be read."""
+
 
 def identity() -> dict[str, str]:
     """Who records, on what, since when."""

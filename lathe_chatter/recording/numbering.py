@@ -8,6 +8,7 @@ publishers, one ended and another went on in its place, and what lies between wa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 _SETTLING = 1.0
 """s that a new publisher may be heard before the graph has it."""
@@ -23,22 +24,38 @@ class _Sequence:
     heard: float
 
 
+class Loss(NamedTuple):
+    """Messages that are missing.
+
+    Attributes:
+        messages: How many.
+        since: When the last one before them came, s.
+        until: When the first one after them came, s.
+    """
+
+    messages: int
+    since: float
+    until: float
+
+
 class Numbering:
     """Follows the numbers of the messages of one topic.
 
-    Args:
-        kept: Whether publishers keep messages for late readers: what then is missing before
-            the first message, which has the number 1, is lost too.
-
     Attributes:
-        lost: Messages known to be missing so far.
+        before: Messages of the first publisher that were published before the first one came.
+        losses: What is known to be missing since.
     """
 
-    def __init__(self, *, kept: bool = False) -> None:
+    def __init__(self) -> None:
         """Begin before the first message."""
-        self.lost = 0
-        self._kept = kept
+        self.before = 0
+        self.losses: list[Loss] = []
         self._sequences: list[_Sequence] = []
+
+    @property
+    def lost(self) -> int:
+        """How many messages are known to be missing since the first one."""
+        return sum(loss.messages for loss in self.losses)
 
     def take(self, number: int, now: float) -> None:
         """A message came, at a steady time in s."""
@@ -46,8 +63,8 @@ class Numbering:
             if sequence.last == number - 1:
                 sequence.last, sequence.heard = number, now
                 return
-        if self._kept and not self._sequences:
-            self.lost += number - 1
+        if not self._sequences:
+            self.before = number - 1
         self._sequences.append(_Sequence(number, number, now, now))
 
     def settle(self, publishers: int, now: float) -> None:
@@ -70,7 +87,9 @@ class Numbering:
         before = [each for each in ended if each.last < sequence.first]
         if before:
             origin = max(before, key=lambda each: each.last)
-            self.lost += sequence.first - origin.last - 1
+            missing = sequence.first - origin.last - 1
+            if missing:
+                self.losses.append(Loss(missing, origin.heard, sequence.begun))
             sequence.begun = origin.begun
             sequence.first = origin.first
             self._sequences.remove(origin)

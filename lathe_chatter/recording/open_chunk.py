@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from array import array
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import lz4.frame
@@ -46,13 +47,17 @@ class ClosedChunk:
 
 
 class OpenChunk:
-    """Collects schemas, channels and messages.
+    """Collects messages, and what their channels are: any chunk can be read by itself.
 
     A message costs a packed head and two appends: this is the path that each one takes.
+
+    Args:
+        channels: The records of each channel and its schema, by number.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, channels: Mapping[int, bytes]) -> None:
         """Begin empty."""
+        self._channels = channels
         self._records = bytearray()
         self._indexes: dict[int, array[int]] = {}
 
@@ -66,10 +71,6 @@ class OpenChunk:
         """Whether there is anything to close for."""
         return bool(self._indexes)
 
-    def add(self, record: McapRecord) -> None:
-        """Add a schema or a channel."""
-        self._records += record_bytes(record)
-
     def add_message(
         self, channel: int, log_time: int, publish_time: int, sequence: int, data: bytes
     ) -> None:
@@ -77,6 +78,7 @@ class OpenChunk:
         index = self._indexes.get(channel)
         if index is None:
             index = self._indexes[channel] = array('Q')
+            self._records += self._channels[channel]
         records = self._records
         index.append(log_time)
         index.append(len(records))

@@ -13,10 +13,13 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
 from lathe_chatter.recording.sample_series import Samples, joined
 from lathe_chatter.recording.scan import Damage
+
+__all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 
 _SPLIT = re.compile(r'_(\d+)\.mcap$')
 
@@ -110,7 +113,7 @@ class Run:
                 if ready:
                     yield from ready
                     waiting = waiting[len(ready) :]
-                found = _raw(file, contents.messages, topics)
+                found = raw_of(file, contents.messages, topics)
                 waiting = sorted([*waiting, *found], key=lambda raw: raw.log_time)
             yield from waiting
 
@@ -208,23 +211,22 @@ class Run:
         return names[0]
 
 
-def _raw(file: RecordedFile, messages: Any, topics: tuple[str, ...]) -> Iterator[Raw]:
-    """The messages of a chunk that are of some topics."""
-    channels = file.known.channels
-    for place, head in enumerate(messages.heads):
-        channel = channels.get(int(head['channel']))
-        if channel is None or (topics and channel.topic not in topics):
-            continue
-        schema = file.known.schemas.get(channel.schema_id)
-        if schema is None:
-            continue
+def raw_of(file: RecordedFile, messages: Messages, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
+    """The messages of a chunk that are of some topics, or of any if none is named."""
+    known = file.known
+    chosen = {
+        number: (channel.topic, known.schemas[channel.schema_id].name)
+        for number, channel in known.channels.items()
+        if (not topics or channel.topic in topics) and channel.schema_id in known.schemas
+    }
+    for place in np.flatnonzero(np.isin(messages.heads['channel'], list(chosen))):
+        head = messages.heads[place]
         yield Raw(
-            channel.topic,
-            schema.name,
+            *chosen[int(head['channel'])],
             int(head['log_time']),
             int(head['publish_time']),
             int(head['sequence']),
-            messages.payload(place),
+            messages.payload(int(place)),
         )
 
 
@@ -242,7 +244,7 @@ def read_run(path: Path | str, *, damaged: bool = False) -> Run:
     path = Path(path)
     if path.is_file():
         return Run(path, (path,), damaged)
-    files = [file for file in path.glob('*.mcap') if _SPLIT.search(file.name)]
+    files = list(path.glob('*.mcap'))
     if not files:
         what = 'holds no recorded run' if path.is_dir() else 'does not exist'
         raise RunReadError(f'{path} {what}.')

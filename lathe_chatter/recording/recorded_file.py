@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+import yaml
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
@@ -70,6 +73,14 @@ class RecordedFile:
             if channel.schema_id in self.known.schemas
         }
 
+    def count(self, topic: str) -> int:
+        """How many messages of a topic the file says it has; 0 if it does not say."""
+        statistics = self.known.statistics
+        if statistics is None:
+            return 0
+        numbers = [n for n, channel in self.known.channels.items() if channel.topic == topic]
+        return sum(statistics.channel_message_counts.get(number, 0) for number in numbers)
+
     def contents(self, wanted: Wanted | None = None) -> Iterator[Contents]:
         """The messages of each sound chunk; schemas and channels are known before they come."""
         for found in scan(self.path, wanted):
@@ -79,35 +90,50 @@ class RecordedFile:
                     yield contents
             elif isinstance(found, Damage):
                 self._on_damage(found)
-            elif found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._learn(found.opcode, found.content)
+            elif not self.has_summary and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                # No CRC covers what stands outside of chunks: only where there is nothing better.
+                with contextlib.suppress(*_UNREADABLE):
+                    add_record(self.known, found.opcode, found.content)
 
     def notes(self) -> Iterator[Note]:
         """Every note, in order."""
-        for found in self._plain(Opcode.METADATA):
-            record = Metadata.read(found)
+        for record in self._plain(Opcode.METADATA, Metadata):
             yield Note(record.name, dict(record.metadata))
 
     def attachments(self) -> Iterator[Any]:
         """Every attachment, as mcap has it, in order."""
-        for found in self._plain(Opcode.ATTACHMENT):
-            yield Attachment.read(found)
+        return self._plain(Opcode.ATTACHMENT, Attachment)
 
-    def _plain(self, opcode: int) -> Iterator[Any]:
+    def _plain(self, opcode: int, kind: Any) -> Iterator[Any]:
         for found in scan(self.path, lambda _first, _last: False):
             if isinstance(found, Plain) and found.opcode == opcode:
-                yield ReadDataStream(BytesIO(found.content))
+                try:
+                    yield kind.read(ReadDataStream(BytesIO(found.content)))
+                except _UNREADABLE:
+                    where = found.offset, found.offset + len(found.content)
+                    self._on_damage(Damage(self.path, *where, 'a note cannot be read'))
 
     def _opened(self, chunk: Chunk) -> Contents | None:
         try:
             messages = messages_of(chunk)
             for offset in messages.others:
                 opcode, length = struct.unpack_from('<BQ', chunk.records, offset)
-                self._learn(opcode, chunk.records[offset + 9 : offset + 9 + length])
+                content = chunk.records[offset + 9 : offset + 9 + length]
+                add_record(self.known, opcode, content)
         except _UNREADABLE as error:
             self._on_damage(Damage(self.path, chunk.offset, chunk.offset, str(error)))
             return None
+        unknown = set(np.unique(messages.heads['channel']).tolist()) - set(self.known.channels)
+        if unknown:
+            reason = f'its messages of channel {min(unknown)} are of a topic that nothing names'
+            self._on_damage(Damage(self.path, chunk.offset, chunk.offset, reason))
         return Contents(chunk.first, messages)
 
-    def _learn(self, opcode: int, content: bytes) -> None:
-        add_record(self.known, opcode, content)
+
+def offers_of(channel: Any) -> list[dict[str, Any]]:
+    """The profiles that the publishers of a channel offered, as rosbag2 writes them."""
+    try:
+        offers = yaml.safe_load(channel.metadata.get('offered_qos_profiles', ''))
+    except yaml.YAMLError:
+        return []
+    return offers if isinstance(offers, list) else []

@@ -51,9 +51,10 @@ class Chunk(NamedTuple):
 
 
 class Plain(NamedTuple):
-    """A record outside of chunks: its opcode and content."""
+    """A record outside of chunks: its opcode, and its content with where that begins."""
 
     opcode: int
+    offset: int
     content: bytes
 
 
@@ -118,27 +119,31 @@ class _Walk:
                 return
             if found is None:
                 start, position = self._sound or position, self._next_chunk()
-                reason = 'what is here cannot be read'
-                yield Damage(self._file, start, position, reason)
+                yield Damage(self._file, start, position, 'what is here cannot be read')
                 if position >= self._size:
                     return
                 continue
             opcode, length = found
-            end = position + _HEAD.size + length
-            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+            if opcode in _SIZES:  # the end of the data
                 return
-            if opcode == Opcode.CHUNK:
-                try:
-                    chunk, end = self._chunk(position, length)
-                except _BadChunkError as error:
-                    yield Damage(self._file, position, end, str(error))
-                else:
-                    self._sound = end
-                    if chunk is not None:
-                        yield chunk
-            else:
-                yield Plain(opcode, self._read(position + _HEAD.size, length))
-            position = end
+            record, position = self._record(position, opcode, length)
+            if record is not None:
+                yield record
+
+    def _record(
+        self, position: int, opcode: int, length: int
+    ) -> tuple[Chunk | Plain | Damage | None, int]:
+        """What a record is, None for an unwanted chunk, and where the next one begins."""
+        end = position + _HEAD.size + length
+        if opcode != Opcode.CHUNK:
+            offset = position + _HEAD.size
+            return Plain(opcode, offset, self._read(offset, length)), end
+        try:
+            chunk, end = self._chunk(position, length)
+        except _BadChunkError as error:
+            return Damage(self._file, position, end, str(error)), end
+        self._sound = end
+        return chunk, end
 
     def _read(self, offset: int, size: int) -> bytes:
         return os.pread(self._descriptor, size, offset)

@@ -16,6 +16,8 @@ from mcap.records import Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 _FOOTER = struct.Struct('<BQQQI')
+_DATA_END = struct.Struct('<BQI')
+_AT_ONCE = 1 << 22
 _HEAD = struct.Struct('<BQ')
 
 
@@ -62,6 +64,26 @@ def read_summary(file: Path) -> Summary | None:
         return _parsed(data, start)
     except (struct.error, ValueError, EOFError):
         return None
+
+
+def body_is_sound(file: Path, summary: Summary) -> bool:
+    """Whether everything before the summary has its CRC; true where its writer made none.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    with file.open('rb') as stream:
+        left = summary.start - _DATA_END.size
+        crc = 0
+        while left > 0:
+            data = stream.read(min(left, _AT_ONCE))
+            crc = zlib.crc32(data, crc)
+            left -= len(data)
+        end = stream.read(_DATA_END.size)
+    if left < 0 or len(end) < _DATA_END.size:
+        return False
+    opcode, length, expected = _DATA_END.unpack(end)
+    return (opcode, length) == (Opcode.DATA_END, 4) and expected in (0, crc)
 
 
 def _parsed(data: bytes, start: int) -> Summary:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from lathe_chatter import __version__
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.recorder_node import RecorderNode
-from lathe_chatter.recording import read_run
+from lathe_chatter.recording import read_run, verify
 
 Start = Callable[..., Any]
 KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -118,3 +120,95 @@ def test_an_existing_folder_at_the_start_of_the_process_is_one_sentence(tmp_path
     )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr.strip() == f'{tmp_path} exists already, and no recorded run is overwritten.'
+
+
+def test_publishers_that_share_a_topic_lose_nothing(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    first = bench.node.create_publisher(Float64, '/n', KEPT)
+    for k in range(20):
+        first.publish(Float64(data=float(k)))
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
+    spin_until(lambda: recorder.messages_of('/n') == 20, 'the messages of the first')
+    second = bench.node.create_publisher(Float64, '/n', KEPT)
+    for k in range(40):
+        (first, second)[k % 2].publish(Float64(data=float(k)))
+    spin_until(lambda: recorder.messages_of('/n') == 60, 'the messages of both')
+    recorder.stop()
+    assert recorder.lost_of('/n') == 0
+    assert verify(tmp_path / 'run').findings == []
+
+
+def test_the_run_knows_who_made_it_and_the_parameters_of_the_lathe(
+    start: Start, spin_until: Any, tmp_path: Path
+) -> None:
+    start(LatheNode, depth_of_cut=0.0007, seed=5)
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['lathe/samples'])
+    spin_until(lambda: recorder.parameters_noted('/lathe'), 'the parameters')
+    recorder.stop()
+    notes = {note.name: note.values for note in read_run(tmp_path / 'run').notes()}
+    assert notes['lathe_chatter/made_by']['lathe_chatter'] == __version__
+    parameters = json.loads(notes['lathe_chatter/parameters/lathe']['parameters'])
+    assert (parameters['depth_of_cut'], parameters['seed']) == (0.0007, 5)
+    assert parameters['tool.natural_frequency'] == 775.0
+
+
+@pytest.fixture
+def recorder_process(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    started: list[subprocess.Popen[str]] = []
+
+    def make(*parameters: str) -> subprocess.Popen[str]:
+        given = [f'output:={tmp_path / "run"}', 'topics:=[/n]', *parameters]
+        words = [word for parameter in given for word in ('-p', parameter)]
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'lathe_chatter.nodes.recorder_node', '--ros-args', *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        return process
+
+    yield make
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def test_a_full_disk_ends_it_with_a_sentence_and_exit_1(
+    recorder_process: Any, domain: int, tmp_path: Path
+) -> None:
+    assert domain >= 0
+    process = recorder_process(f'min_free_space:={2**53}')
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert err.splitlines()[-1].endswith('the recording ends, complete up to here.')
+    assert 'Traceback' not in err
+    assert read_run(tmp_path / 'run').topics == {}
+
+
+def test_a_killed_recorder_leaves_all_but_the_last_moment(
+    recorder_process: Any, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    publisher = bench.node.create_publisher(Float64, '/n', KEPT)
+    process = recorder_process()
+    spin_until(lambda: publisher.get_subscription_count() == 1, 'the recorder')
+    run = tmp_path / 'run'
+
+    def on_disk() -> list[float]:
+        file = run / 'run_0.mcap'
+        found = read_run(file).messages('/n') if file.exists() else ()
+        return [recorded.message.data for recorded in found]
+
+    for k in range(10):
+        publisher.publish(Float64(data=float(k)))
+    spin_until(lambda: len(on_disk()) == 10, 'ten messages on disk')
+    for k in range(10, 20):
+        publisher.publish(Float64(data=float(k)))
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    found = on_disk()
+    assert found == [float(k) for k in range(len(found))]
+    assert 10 <= len(found) <= 20
+    losses = [finding.text for finding in verify(run).findings if finding.loss]
+    assert losses == ['The recorder did not finish: what came at the end is not there.']

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from lathe_chatter.recording.numbering import Numbering
+from lathe_chatter.recording.numbering import Loss, Numbering
 
 
-def follow(numbers: list[int], publishers: int, *, kept: bool = False) -> int:
-    numbering = Numbering(kept=kept)
+def follow(numbers: list[int], publishers: int) -> int:
+    numbering = Numbering()
     for k, number in enumerate(numbers):
         numbering.take(number, now=0.01 * k)
     numbering.settle(publishers, math.inf)
@@ -27,9 +27,20 @@ def test_gaps_are_counted_message_by_message() -> None:
     assert follow(kept, 1) == 2000 - len(kept)
 
 
-def test_what_was_published_before_is_lost_only_where_it_was_kept() -> None:
-    assert follow([50, 51, 52], 1, kept=True) == 49
-    assert follow([50, 51, 52], 1) == 0
+def test_what_was_published_before_is_counted_apart() -> None:
+    numbering = Numbering()
+    for number in (50, 51, 52):
+        numbering.take(number, now=0.0)
+    numbering.settle(1, math.inf)
+    assert (numbering.before, numbering.lost) == (49, 0)
+
+
+def test_a_loss_says_between_which_messages_it_is() -> None:
+    numbering = Numbering()
+    for number, now in ((1, 0.1), (2, 0.2), (7, 0.7), (8, 0.8)):
+        numbering.take(number, now)
+    numbering.settle(1, math.inf)
+    assert numbering.losses == [Loss(4, 0.2, 0.7)]
 
 
 def test_publishers_that_take_turns_lose_nothing() -> None:

@@ -1,0 +1,90 @@
+"""`recover`: every whole chunk of a damaged run into a new one."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+from lathe_chatter.recording.identity import RECOVERED
+from lathe_chatter.recording.reader import Run, raw_of, read_run
+from lathe_chatter.recording.recorded_file import RecordedFile, offers_of
+from lathe_chatter.recording.scan import Damage
+from lathe_chatter.recording.writer import CLOSED, RunWriter, Topic
+
+_NOT_COPIED = (CLOSED, 'rosbag2')
+"""Notes that a writer makes itself."""
+
+
+class Recovery(NamedTuple):
+    """What became of a damaged run.
+
+    Attributes:
+        run: The new one.
+        messages: Saved, by name of topic.
+        damage: What could not be read of the old one.
+    """
+
+    run: Run
+    messages: Counter[str]
+    damage: list[Damage]
+
+
+def recover(path: Path | str, output: Path) -> Recovery:
+    """Save what is sound of a run; the original is only read.
+
+    Args:
+        path: The run, a folder or a file.
+        output: The folder to make.
+
+    Raises:
+        RunReadError: If there is no such run.
+        RunExistsError: If the folder to make exists.
+        OSError: If it cannot be written.
+    """
+    old = read_run(path)
+    saved: Counter[str] = Counter()
+    damage: list[Damage] = []
+    with RunWriter(output) as writer:
+        for place, file in enumerate(old.files):
+            if place:
+                writer.split()
+            _copy(RecordedFile(file, damage.append), writer, saved)
+        said = json.dumps([str(each) for each in damage])
+        writer.note(RECOVERED, {'from': str(old.path), 'damage': said})
+    return Recovery(read_run(output), saved, damage)
+
+
+def _copy(file: RecordedFile, writer: RunWriter, saved: Counter[str]) -> None:
+    """Copy what one file holds."""
+    for note in file.notes():
+        if note.name not in _NOT_COPIED:
+            writer.note(note.name, note.values)
+    for attachment in file.attachments():
+        writer.attach(attachment.name, attachment.media_type, attachment.data)
+    for contents in file.contents():
+        for raw in raw_of(file, contents.messages):
+            writer.add_topic(_topic(file, raw.topic))
+            writer.write(
+                raw.topic,
+                raw.data,
+                log_time=raw.log_time,
+                publish_time=raw.publish_time,
+                sequence=raw.sequence,
+            )
+            saved[raw.topic] += 1
+        writer.commit()
+
+
+def _topic(file: RecordedFile, name: str) -> Topic:
+    """What a topic is, as the file describes it."""
+    channel = next(c for c in file.known.channels.values() if c.topic == name)
+    schema = file.known.schemas[channel.schema_id]
+    return Topic(
+        name,
+        schema.name,
+        schema.data.decode(),
+        channel.metadata.get('topic_type_hash', ''),
+        tuple(offers_of(channel)),
+    )

@@ -1,0 +1,163 @@
+"""Blocks of samples joined into signals, with what is missing between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter.errors import LayoutError
+from lathe_chatter.model import Array, Integers
+from lathe_chatter.recording.sample_blocks import Blocks
+
+_TIME = 'time'
+_LARGER_THAN_STEP = 1.5
+"""A step of time between two samples so many times the usual one is a gap."""
+
+
+class Samples(NamedTuple):
+    """The samples of one lathe.
+
+    Attributes:
+        columns: Each signal by name (n,), SI.
+        log_times: When each block was received, ns since the epoch (blocks,).
+        block_ends: Simulated time of the last sample of each block, s (blocks,).
+        gaps: Where samples are missing: simulated times before and after, s.
+        restarts: Where simulated time went back: simulated times before and after, s.
+    """
+
+    columns: dict[str, Array]
+    log_times: Integers
+    block_ends: Array
+    gaps: list[tuple[float, float]]
+    restarts: list[tuple[float, float]]
+
+    def simulated_time(self, log_time: int) -> float:
+        """Simulated time when something else was recorded, s: that of the blocks about it."""
+        relative = (self.log_times - self.log_times[0]).astype(float)
+        return float(np.interp(float(log_time - self.log_times[0]), relative, self.block_ends))
+
+
+class Seams:
+    """Finds where samples do not follow each other.
+
+    Attributes:
+        gaps: Simulated times before and after what is missing, s.
+        restarts: Simulated times before and after simulated time went back, s.
+        lost: How many samples are missing in the gaps.
+        step: The usual time between two samples, s; 0 while unknown.
+    """
+
+    def __init__(self) -> None:
+        """Begin before the first sample."""
+        self.gaps: list[tuple[float, float]] = []
+        self.restarts: list[tuple[float, float]] = []
+        self.lost = 0
+        self.step = 0.0
+        self._last: Array = np.zeros(0)
+
+    def follow(self, times: Array) -> None:
+        """Go on with the times of more samples (n,), s."""
+        joined = np.concatenate((self._last, times))
+        self._last = joined[-1:]
+        steps = np.diff(joined)
+        if not len(steps):
+            return
+        if self.step == 0.0:
+            self.step = float(np.median(steps))
+        for place in np.flatnonzero((steps > _LARGER_THAN_STEP * self.step) | (steps <= 0.0)):
+            seam = float(joined[place]), float(joined[place + 1])
+            if steps[place] <= 0.0:
+                self.restarts.append(seam)
+            else:
+                self.gaps.append(seam)
+                self.lost += round(float(steps[place]) / self.step) - 1
+
+
+def joined(
+    blocks: Iterator[Blocks],
+    expected: int,
+    wanted: tuple[str, ...] | None,
+    start: float,
+    end: float,
+) -> Samples | None:
+    """All samples of blocks within a range of simulated time.
+
+    Args:
+        blocks: In order.
+        expected: How many blocks there are, as far as is known.
+        wanted: Names of columns; None for all.
+        start: Of the range, s.
+        end: Of the range, s.
+
+    Returns:
+        The samples; those of the names that exist. None where there is not one sample.
+
+    Raises:
+        LayoutError: If the samples have no time.
+    """
+    signals: _Signals | None = None
+    log_times: list[Integers] = []
+    ends: list[Array] = []
+    seams = Seams()
+    for each in blocks:
+        if not each.samples.size:
+            continue
+        if signals is None:
+            names = [n for n in each.columns if wanted is None or n in wanted]
+            signals = _Signals(names, expected * int(each.rows[0]))
+        time = _times(each)
+        last = time[np.cumsum(each.rows) - 1]
+        part = each.samples
+        if start > time.min() or end < time.max():
+            inside = (time >= start) & (time <= end)
+            part, time = part[inside], time[inside]
+            kept = (last >= start) & (last - (each.rows - 1) * seams.step <= end)
+            log_times.append(each.log_times[kept])
+            ends.append(last[kept])
+        else:
+            log_times.append(each.log_times)
+            ends.append(last)
+        if len(time):
+            seams.follow(time)
+            signals.append(part, each.columns)
+    if signals is None:
+        return None
+    return Samples(
+        signals.taken(),
+        np.concatenate(log_times),
+        np.concatenate(ends),
+        seams.gaps,
+        seams.restarts,
+    )
+
+
+def _times(blocks: Blocks) -> Array:
+    if _TIME not in blocks.columns:
+        raise LayoutError(f'The samples have no column {_TIME}, only {", ".join(blocks.columns)}.')
+    times: Array = blocks.samples[:, blocks.columns.index(_TIME)]
+    return times
+
+
+class _Signals:
+    """Signals that grow at their ends, each in one array, so that nothing is held twice."""
+
+    def __init__(self, names: list[str], expected: int) -> None:
+        self._arrays = {name: np.empty(expected) for name in names}
+        self._room = expected
+        self._size = 0
+
+    def append(self, samples: Array, columns: tuple[str, ...]) -> None:
+        """Add samples (n, k) of named columns."""
+        end = self._size + len(samples)
+        if end > self._room:
+            self._room = max(end, self._room * 3 // 2)
+            self._arrays = {n: np.resize(a, self._room) for n, a in self._arrays.items()}
+        for name, array in self._arrays.items():
+            array[self._size : end] = samples[:, columns.index(name)]
+        self._size = end
+
+    def taken(self) -> dict[str, Array]:
+        """What was added, by name."""
+        return {name: array[: self._size] for name, array in self._arrays.items()}
