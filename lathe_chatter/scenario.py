@@ -64,6 +64,11 @@ class Scenario:
     steps: tuple[Step, ...] = ()
     expect: Mapping[str, bool] = field(default_factory=dict)
 
+    @property
+    def parameter_names(self) -> list[str]:
+        """Every parameter that the scenario names, at the start or in a step."""
+        return [*self.parameters, *(name for step in self.steps for name in step.changes)]
+
 
 def shipped_scenarios() -> dict[str, Path]:
     """The scenario files of the package by name."""

@@ -98,11 +98,15 @@ def _play(scenario: Scenario, output: Path, console: Console) -> bool:
         from rclpy.signals import SignalHandlerOptions
 
         from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
+        from lathe_chatter.nodes.parameters import LATHE
     except ImportError as error:
         raise RunFailedError(
             f'ROS 2 is not there ({error}): source an installation, or use `make run`, '
             'which installs what it needs.'
         ) from None
+    for name in scenario.parameter_names:
+        if name not in LATHE:
+            raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     operator = Operator(scenario, tell=console.print)
     executor = SingleThreadedExecutor()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +58,17 @@ class Messages(NamedTuple):
         return self.records[start : start + int(self.sizes[place])]
 
 
+def joined_messages(parts: Sequence[Messages]) -> Messages:
+    """The messages of several chunks as if they were of one."""
+    begins = np.cumsum([0, *(len(part.records) for part in parts[:-1])])
+    return Messages(
+        b''.join(part.records for part in parts),
+        np.concatenate([part.heads for part in parts]),
+        np.concatenate([part.starts + begin for part, begin in zip(parts, begins, strict=True)]),
+        [],
+    )
+
+
 def messages_of(chunk: Chunk) -> Messages:
     """All messages of a chunk, in the order in which they were written.
 
@@ -70,9 +82,10 @@ def messages_of(chunk: Chunk) -> Messages:
     """
     found = _by_indexes(chunk)
     if found is None:
-        found = _by_walking(chunk.records, 0, len(chunk.records))
-    offsets, others = found
-    heads = _heads(chunk.records, offsets)
+        offsets, others = _by_walking(chunk.records, 0, len(chunk.records))
+        heads = _heads(chunk.records, offsets)
+    else:
+        offsets, heads, others = found
     return Messages(chunk.records, heads, offsets + HEAD.itemsize, others)
 
 
@@ -87,14 +100,16 @@ def _heads(records: bytes, offsets: Integers) -> NDArray[Any]:
     return heads
 
 
-def _by_indexes(chunk: Chunk) -> tuple[Integers, list[int]] | None:
-    """Offsets of messages and of other records, or None if the indexes do not tell them."""
+def _by_indexes(chunk: Chunk) -> tuple[Integers, NDArray[Any], list[int]] | None:
+    """Offsets and heads of messages, and offsets of other records; None if they are not told."""
     if not chunk.indexes or any(len(index) % 16 for index in chunk.indexes.values()):
         return None
     pairs = np.frombuffer(b''.join(chunk.indexes.values()), '<u8')
-    offsets = np.sort(pairs[1::2].astype(np.int64))
+    offsets = pairs[1::2].astype(np.int64)
+    if len(chunk.indexes) > 1:  # that of one channel is in order
+        offsets.sort()
     size = len(chunk.records)
-    if not len(offsets) or offsets[0] < 0 or offsets[-1] > size - HEAD.itemsize:
+    if not len(offsets) or offsets.min() < 0 or offsets.max() > size - HEAD.itemsize:
         return None
     heads = _heads(chunk.records, offsets)
     ends = offsets + heads['length'].astype(np.int64) + _BEFORE
@@ -112,7 +127,7 @@ def _by_indexes(chunk: Chunk) -> tuple[Integers, list[int]] | None:
         if len(between):
             return None
         others += more
-    return offsets, others
+    return offsets, heads, others
 
 
 def _by_walking(records: bytes, start: int, stop: int) -> tuple[Integers, list[int]]:

@@ -7,8 +7,9 @@ replace, so there is no moment between calls at which the file lacks an end: kil
 came since the last commit and nothing else. (Should it strike inside the call itself, some tens
 of microseconds in every 0.25 s, the file has no end, and `recover` has every chunk.)
 
-The package mcap has a writer, but one that makes every summary from nothing: after an hour at
-four commits a second that takes 60 ms. Here a commit adds to the summary's bytes what is new.
+The package mcap has a writer, but one that makes every summary from nothing, which takes 31 ms
+after half an hour of four commits a second. Here a commit adds to the summary's bytes what is
+new.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.recording.chunk_messages import Messages
+from lathe_chatter.recording.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
 from lathe_chatter.recording.sample_series import Samples, joined
@@ -21,6 +21,8 @@ from lathe_chatter.recording.scan import Damage
 
 __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 
+_CHUNKS_AT_ONCE = 16
+"""Arrays of a single chunk are so small that calls would cost more than their work."""
 _SPLIT = re.compile(r'_(\d+)\.mcap$')
 
 
@@ -134,7 +136,7 @@ class Run:
             yield Recorded(raw.topic, raw.log_time, raw.sequence, message)
 
     def sample_blocks(self, topic: str | None = None) -> Iterator[Blocks]:
-        """The samples of a lathe as they were recorded, some 0.25 s at a time.
+        """The samples of a lathe as they were recorded, some 4 s at a time.
 
         Raises:
             RunReadError: If a file is damaged, or there are several lathes and no topic is named.
@@ -142,9 +144,15 @@ class Run:
         """
         name = topic or self._only_samples()
         for file in self._opened():
+            waiting: list[Messages] = []
             for contents in file.contents():
-                for number in [n for n, c in file.known.channels.items() if c.topic == name]:
-                    yield from blocks_of(contents.messages.of(number))
+                numbers = [n for n, c in file.known.channels.items() if c.topic == name]
+                waiting += [contents.messages.of(number) for number in numbers]
+                if len(waiting) >= _CHUNKS_AT_ONCE:
+                    yield from blocks_of(joined_messages(waiting))
+                    waiting.clear()
+            if waiting:
+                yield from blocks_of(joined_messages(waiting))
 
     def samples(
         self,

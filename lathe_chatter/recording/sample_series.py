@@ -66,6 +66,8 @@ class Seams:
             return
         if self.step == 0.0:
             self.step = float(np.median(steps))
+        if steps.min() > 0.0 and steps.max() <= _LARGER_THAN_STEP * self.step:
+            return
         for place in np.flatnonzero((steps > _LARGER_THAN_STEP * self.step) | (steps <= 0.0)):
             seam = float(joined[place]), float(joined[place + 1])
             if steps[place] <= 0.0:

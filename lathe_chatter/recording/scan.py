@@ -161,6 +161,10 @@ class _Walk:
             return None
         if opcode == Opcode.CHUNK and self._parts(position, length) is None:
             return None
+        if opcode == Opcode.MESSAGE_INDEX:
+            fields = self._read(position + _HEAD.size, _INDEX.size)
+            if len(fields) < _INDEX.size or _INDEX.unpack(fields)[1] != length - _INDEX.size:
+                return None
         return opcode, length
 
     def _parts(self, position: int, length: int) -> tuple[int, int, int, int, str, int] | None:
@@ -197,8 +201,6 @@ class _Walk:
         indexes: dict[int, bytes] = {}
         while (found := self._head(end)) is not None and found[0] == Opcode.MESSAGE_INDEX:
             content = self._read(end + _HEAD.size, found[1])
-            if len(content) < _INDEX.size:
-                break
             indexes[_INDEX.unpack_from(content)[0]] = content[_INDEX.size :]
             end += _HEAD.size + found[1]
         return Chunk(position, first, last, records, indexes), end

@@ -143,3 +143,21 @@ def test_a_refused_step_ends_the_run_with_the_reason(
     assert 'depth_of_cut' in done.stderr
     assert '0.01 m' in done.stderr
     assert 'Traceback' not in done.stdout + done.stderr
+
+
+def test_a_misspelt_parameter_is_refused_before_anything_starts(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    scenario = tmp_path / 'wrong.yaml'
+    scenario.write_text(SHORT.replace('depth_of_cut: 0.00062', 'depth_of_cuts: 0.0006'))
+    done = subprocess.run(
+        command('--scenario', str(scenario), '--output', str(tmp_path / 'run')),
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 2
+    assert "'depth_of_cuts': did you mean depth_of_cut?" in done.stderr
+    assert not (tmp_path / 'run').exists()
