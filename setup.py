@@ -24,6 +24,7 @@ setup(
         'rosbags',  # reads the runs of any rosbag2 writer, and knows the message types
         'mcap',  # writes and reads MCAP
         'lz4',  # the compression of the chunks of a run
+        'zstandard',  # that of runs written by others
     ],
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
