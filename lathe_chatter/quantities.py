@@ -89,6 +89,12 @@ def quantity_of(entry: Field[Any]) -> Quantity | None:
     return entry.metadata.get(_KEY)
 
 
+def limits_of(model: type, name: str) -> Quantity:
+    """The `Quantity` of a dataclass's field `name`."""
+    limits: Quantity = model.__dataclass_fields__[name].metadata[_KEY]  # type: ignore[attr-defined]  # a dataclass
+    return limits
+
+
 def check_fields(instance: Any, prefix: str = '') -> None:
     """Validate every quantity field of a frozen dataclass and store it as a float.
 

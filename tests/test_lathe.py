@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +15,7 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import EventKind, VirtualLathe
+from lathe_chatter.lathe_state import StateError
 from lathe_chatter.model import Array, BearingContact, Cut, Machine, Mode
 
 _NOISY = Cut(3017.0, 0.8e-3, force_noise=0.05, sensor_noise=1e-7, runout=2e-6)
@@ -98,28 +98,31 @@ def test_a_snapshot_is_a_value_of_its_own() -> None:
 
 
 _CONTINUE = """
-import pickle, sys
+import sys
 from lathe_chatter.lathe import VirtualLathe
-with open(sys.argv[1], 'rb') as file:
-    settings, state = pickle.load(file)
-lathe = VirtualLathe(**settings)
-lathe.restore(state)
+from lathe_chatter.lathe_state import LatheState
+lathe = VirtualLathe.continued(LatheState.load(sys.argv[1]))
 sys.stdout.buffer.write(lathe.advance(500).tobytes())
 """
 
 
 def test_a_saved_state_goes_on_bit_for_bit_in_another_process(tmp_path: Path) -> None:
-    settings = {'cut': _NOISY, 'seed': 5, 'spindle_acceleration': 2e4}
-    lathe = VirtualLathe(**settings)
+    lathe = VirtualLathe(cut=_NOISY, seed=5, spindle_acceleration=2e4)
     lathe.advance(777)
     lathe.retune(_NOISY.with_changes(spindle_speed_rpm=5000.0))
     lathe.advance(10)
-    file = tmp_path / 'state'
-    file.write_bytes(pickle.dumps((settings, lathe.snapshot())))
+    file = tmp_path / 'state.npz'
+    lathe.snapshot().save(file)
     done = subprocess.run(
         [sys.executable, '-c', _CONTINUE, str(file)], capture_output=True, check=True
     )
     assert done.stdout == lathe.advance(500).tobytes()
+
+
+def test_a_lathe_of_another_setup_is_not_restored() -> None:
+    saved = VirtualLathe(seed=5, sample_rate=2e4).snapshot()
+    with pytest.raises(StateError, match='differs from this one in its sample_rate and seed'):
+        VirtualLathe().restore(saved)
 
 
 def test_samples_follow_each_other_in_time_and_angle() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lathe_chatter.compiled import compiled
-from lathe_chatter.integrator.propagation import slope_at, value_at
+from lathe_chatter.integrator.propagation import slope_at, value_and_slope, value_at
 from lathe_chatter.model import Array
 
 NEVER = 2.0
@@ -13,21 +13,30 @@ _CLOSE = 1e-15
 
 
 @compiled()
-def _root(series: Array, terms: int, sign: float, low: float, high: float) -> float:
-    """The root of sign * series between `low` (positive there) and `high` (negative)."""
-    place = 0.5 * (low + high)
+def _root(series: Array, terms: int, sign: float, low: float, high: float, place: float) -> float:
+    """The root of sign * series between `low` (positive there) and `high` (negative).
+
+    Newton's method from `place`. Its steps shrink as step' = c step^2, so two of them tell the
+    size of the next: the last one need not be taken to know that it is nothing.
+    """
+    last = 0.0
     for _ in range(_ITERATIONS):
-        value = sign * value_at(series, terms, place)
-        if value >= 0.0:
+        value, slope = value_and_slope(series, terms, place)
+        if sign * value >= 0.0:
             low = place
         else:
             high = place
-        step = value / (sign * slope_at(series, terms, place))
-        if abs(step) <= _CLOSE or high - low <= _CLOSE:
-            break
+        step = value / slope
+        size = abs(step)
         place -= step
         if not low < place < high:  # Newton has left the bracket, or the slope is zero
-            place = 0.5 * (low + high)
+            place, last = 0.5 * (low + high), 0.0
+            if high - low <= _CLOSE:
+                break
+            continue
+        if size * size * size <= _CLOSE * last * last:
+            break
+        last = size
     return place
 
 
@@ -64,20 +73,21 @@ def first_crossing(series: Array, terms: int, sign: float) -> float:
     start = sign * series[0]
     end = sign * value_at(series, terms, 1.0)
     slope_start = sign * series[1]
-    if end < 0.0:
-        if start > 0.0:
-            return _root(series, terms, sign, 0.0, 1.0)
-        if slope_start <= 0.0:
-            return 0.0
-        top = _turning_point(series, terms, sign > 0.0)
-        if sign * value_at(series, terms, top) <= 0.0:
-            return 0.0
-        return _root(series, terms, sign, top, 1.0)
-    if slope_start < 0.0 < sign * slope_at(series, terms, 1.0):
-        bottom = _turning_point(series, terms, sign < 0.0)
-        if sign * value_at(series, terms, bottom) < 0.0:
-            return _root(series, terms, sign, 0.0, bottom) if start > 0.0 else 0.0
-    return NEVER
+    low, high, place = 0.0, 1.0, NEVER
+    if end < 0.0 < start:
+        place = start / (start - end)
+    elif end < 0.0 < slope_start:  # it grows first, and comes back
+        low = _turning_point(series, terms, sign > 0.0)
+        place = 0.5 * (low + high) if sign * value_at(series, terms, low) > 0.0 else 0.0
+    elif end < 0.0:
+        return 0.0
+    elif slope_start < 0.0 < sign * slope_at(series, terms, 1.0):
+        high = _turning_point(series, terms, sign < 0.0)
+        if sign * value_at(series, terms, high) < 0.0:
+            place = 0.5 * high if start > 0.0 else 0.0
+    if 0.0 < place < NEVER:
+        return _root(series, terms, sign, low, high, place)
+    return place
 
 
 @compiled(inline=True)

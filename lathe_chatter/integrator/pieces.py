@@ -11,6 +11,7 @@ import math
 
 from lathe_chatter.compiled import compiled
 from lathe_chatter.integrator import layout, propagation, surface
+from lathe_chatter.integrator.corners import finish_corner, lower
 from lathe_chatter.integrator.events import NEVER, first_crossing, may_turn_back
 from lathe_chatter.integrator.plan import (
     ANGLE_1,
@@ -45,36 +46,6 @@ from lathe_chatter.model import Array, Integers
 _MOST_FLIPS = 32
 """Events in one step before it is finished without looking for more: a grazing contact that
 rounding cannot decide is no reason to stand still."""
-
-
-@compiled(inline=True)
-def _lower(order: int, other: int) -> int:
-    """The lower of two orders of a corner, where 0 stands for none."""
-    return max(order, other) if order == 0 or other == 0 else min(order, other)
-
-
-@compiled(inline=True)
-def _finish_corner(
-    numbers: Array, counts: Integers, nodes: Array, settings: Array, matrices: Array,
-    force: float, speed: float, acceleration: float,
-) -> None:  # fmt: skip
-    """Write what follows the newest node, a corner: it differs from what led to it."""
-    head, regime = counts[layout.HEAD], counts[layout.REGIME]
-    slope, curvature = numbers[layout.MET_SLOPE], numbers[layout.MET_CURVATURE]
-    order = counts[layout.SURFACE_CORNER]
-    if regime & IN_CUT != 0:
-        order = _lower(order, counts[layout.CORNER])
-        xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
-        xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
-        met = numbers[layout.MET] - numbers[layout.FED]
-        bend = relative_acceleration(matrices[regime], xt, vt, xw, vw, met, force)
-        slope = (settings[layout.FEED_SPEED] + vt - vw) / speed
-        curvature = (bend - slope * acceleration) / (speed * speed)
-    nodes[head, surface.SLOPE_AFTER] = slope
-    nodes[head, surface.CURVATURE_AFTER] = curvature
-    if order > 0:
-        nodes[head, surface.ORDER] = min(nodes[head, surface.ORDER], order)
-    counts[layout.CORNER] = counts[layout.SURFACE_CORNER] = 0
 
 
 @compiled(inline=True)
@@ -113,7 +84,7 @@ def _solve(
                 end[k] += matrices[regime, propagation.FORCE_ROW, k] * force
     else:
         _solve_series(numbers, regime, mechanics, force, scratch)
-        propagation.end_state(scratch.tool, scratch.workpiece, piece[DURATION], end)
+        propagation.state_at(scratch.tool, scratch.workpiece, 1.0, piece[DURATION], end)
 
 
 @compiled(inline=True)
@@ -209,7 +180,7 @@ def _move_on(
     numbers[layout.SPEED] += slope * piece[DURATION]
     if ramp_ends:
         numbers[layout.SPEED] = settings[layout.TARGET_SPEED]
-        counts[layout.CORNER] = _lower(counts[layout.CORNER], 2)
+        counts[layout.CORNER] = lower(counts[layout.CORNER], 2)
     if settings[layout.VARIATION] > 0.0:
         phase = numbers[layout.PHASE] + settings[layout.VARIATION_FREQUENCY] * piece[DURATION]
         numbers[layout.PHASE] = phase - math.floor(phase)
@@ -263,7 +234,7 @@ def take_step(
                 numbers[layout.PHASE], settings[layout.VARIATION_FREQUENCY],
             )  # fmt: skip
         if counts[layout.CORNER] > 0 or counts[layout.SURFACE_CORNER] > 0:
-            _finish_corner(numbers, counts, nodes, settings, matrices, force, speed, acceleration)
+            finish_corner(numbers, counts, nodes, settings, matrices, force, speed, acceleration)
         piece[MET_0] = numbers[layout.MET] - numbers[layout.FED]
         piece[RATE_0] = numbers[layout.MET_SLOPE] * speed - settings[layout.FEED_SPEED]
         piece[BEND_0] = (
@@ -281,11 +252,13 @@ def take_step(
         if event != layout.NO_EVENT:
             until = place * piece[DURATION]
             if merge < until < piece[DURATION] - merge:
-                # Inside: the piece ends here, and is solved again as short as it is.
+                # Inside: the piece ends here, on the series in which the event was found.
+                propagation.state_at(
+                    scratch.tool, scratch.workpiece, place, piece[DURATION], scratch.end
+                )
                 node, at_node, ramp_ends = plan_piece(
                     numbers, counts, nodes, settings, slope, until, merge, piece
                 )
-                _solve(numbers, regime, mechanics, matrices, force, step, scratch)
             elif until <= merge:
                 piece[DURATION] = 0.0
             events[found, 0] = counts[layout.SAMPLES]
@@ -304,5 +277,5 @@ def take_step(
             counts[layout.SURFACE_CORNER] = 1
         elif event != layout.NO_EVENT:
             counts[layout.REGIME] ^= ENGAGED
-            counts[layout.CORNER] = _lower(counts[layout.CORNER], 3)
+            counts[layout.CORNER] = lower(counts[layout.CORNER], 3)
     return found, layout.FINISHED

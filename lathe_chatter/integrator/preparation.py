@@ -1,17 +1,60 @@
-"""From a machine and its cut to the constants of the inner loop."""
+"""From a setup and its cut to the constants of the inner loop."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.integrator import propagation
-from lathe_chatter.model import Array, Cut, Machine
+from lathe_chatter.integrator import layout, propagation
+from lathe_chatter.lathe_setup import LatheSetup
+from lathe_chatter.model import Array, BearingContact, Cut, Machine
 
 _TURN_PER_STEP = 0.05
 _MOST_STEPS = 200_000
+
+
+class Constants(NamedTuple):
+    """What the inner loop is given beside a lathe's memory.
+
+    Attributes:
+        settings: What machine and cut ask for (layout.SETTINGS_SIZE,).
+        mechanics: The mechanical constants (propagation.MECHANICS_SIZE,).
+        matrices: The response to a whole step (propagation.REGIMES, ROWS, 4).
+    """
+
+    settings: Array
+    mechanics: Array
+    matrices: Array
+
+
+def constants_of(setup: LatheSetup, cut: Cut, steps: int) -> Constants:
+    """The constants for a cut that takes so many steps a sample."""
+    mechanics = mechanics_of(setup.machine, cut)
+    matrices = propagation.step_matrices(1.0 / (setup.sample_rate * steps), mechanics)
+    return Constants(settings_of(setup, cut), mechanics, matrices)
+
+
+def settings_of(setup: LatheSetup, cut: Cut) -> Array:
+    """What machine and cut ask of the inner loop (layout.SETTINGS_SIZE,)."""
+    settings = np.empty(layout.SETTINGS_SIZE)
+    settings[layout.SAMPLE_RATE] = setup.sample_rate
+    settings[layout.TARGET_SPEED] = cut.spindle_speed_rpm / 60.0
+    settings[layout.ACCELERATION] = setup.spindle_acceleration / 60.0
+    settings[layout.VARIATION] = cut.speed_variation_amplitude
+    settings[layout.VARIATION_FREQUENCY] = cut.speed_variation_frequency
+    settings[layout.FEED_SPEED] = cut.feed_speed if setup.tool_leaves_cut else 0.0
+    settings[layout.CUTTING_STIFFNESS] = setup.machine.cutting_stiffness(cut.depth_of_cut)
+    settings[layout.NOMINAL_FEED_SPEED] = cut.feed_speed
+    settings[layout.MAY_LEAVE_CUT] = setup.tool_leaves_cut
+    settings[layout.HAS_CLEARANCE] = cut.bearing_contact is BearingContact.GAP
+    settings[layout.FORCE_NOISE] = cut.force_noise
+    settings[layout.SENSOR_NOISE] = cut.sensor_noise
+    settings[layout.RUNOUT] = cut.runout
+    settings[layout.LIMIT] = setup.displacement_limit
+    return settings
 
 
 def mechanics_of(machine: Machine, cut: Cut) -> Array:

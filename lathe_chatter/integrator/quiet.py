@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from lathe_chatter.compiled import compiled
 from lathe_chatter.integrator import layout, surface
+from lathe_chatter.integrator.corners import finish_corner
 from lathe_chatter.integrator.events import may_turn_back
 from lathe_chatter.integrator.plan import DETAIL, add
 from lathe_chatter.integrator.propagation import (
@@ -40,10 +41,11 @@ def take_quiet_steps(
     """
     speed, feed_speed = numbers[layout.SPEED], settings[layout.FEED_SPEED]
     unsteady = speed != settings[layout.TARGET_SPEED] or settings[layout.VARIATION] != 0.0
-    corner = counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0
     begun = numbers[layout.LEFT] != 0.0
-    if unsteady or corner or begun or settings[layout.FORCE_NOISE] != 0.0:
+    if unsteady or begun or settings[layout.FORCE_NOISE] != 0.0 or row == out.shape[0]:
         return row
+    if counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0:
+        finish_corner(numbers, counts, nodes, settings, matrices, 0.0, speed, 0.0)
     steps, index = counts[layout.STEPS], counts[layout.STEP]
     rate = settings[layout.SAMPLE_RATE]
     step = 1.0 / (rate * steps)

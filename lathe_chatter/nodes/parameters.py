@@ -12,10 +12,10 @@ from dataclasses import fields
 from typing import Any
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe import SAMPLE_RATE, SEED, SPINDLE_ACCELERATION
+from lathe_chatter.lathe_setup import SEED, LatheSetup
 from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.nodes.parameter_table import ParameterTable, Row, Values, rows_of
-from lathe_chatter.quantities import Quantity
+from lathe_chatter.quantities import Quantity, limits_of
 
 
 def cut_from(values: Values) -> Cut:
@@ -77,6 +77,12 @@ def samples_per_tick(sample_rate: float, tick_rate: float) -> int:
     return count
 
 
+def _setup_row(name: str) -> Row:
+    """A number that a lathe is given at the start."""
+    limits = limits_of(LatheSetup, name)
+    return Row(name, getattr(LatheSetup(), name), limits.meaning, limits)
+
+
 _RATES = ('sample_rate', 'tick_rate')
 
 MACHINE_ROWS = tuple(rows_of(Machine()))
@@ -98,14 +104,9 @@ LATHE = ParameterTable(
             meaning='total chip force that vanishes out of the cut; false: the linear force (2)',
         ),
         *MACHINE_ROWS,
-        Row(
-            'spindle_acceleration',
-            0.0,
-            SPINDLE_ACCELERATION.meaning,
-            SPINDLE_ACCELERATION,
-        ),
+        _setup_row('spindle_acceleration'),
         Row('tick_rate', 500.0, 'rate of publication', Quantity('', 'Hz', low=1.0, high=5e3)),
-        Row('sample_rate', 1e4, SAMPLE_RATE.meaning, SAMPLE_RATE),
+        _setup_row('sample_rate'),
         Row('seed', 0, SEED.meaning, SEED),
         Row('publish_clock', default=False, meaning='whether this node drives /clock'),
     ),

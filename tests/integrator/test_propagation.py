@@ -71,7 +71,7 @@ def test_a_piece_is_the_matrix_exponential(regime: int, duration: float) -> None
     surface, force = rng.normal(size=6) * 1e-5, 2.0
     tool, workpiece = _solved(state, duration, regime, force, surface)
     end = np.empty(4)
-    propagation.end_state(tool, workpiece, duration, end)
+    propagation.state_at(tool, workpiece, 1.0, duration, end)
     exact = _by_matrix_exponential(state, duration, regime, force, surface)
     assert end == pytest.approx(exact, rel=1e-12, abs=1e-18)
 
