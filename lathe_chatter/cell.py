@@ -15,6 +15,8 @@ from lathe_chatter.errors import LatheChatterError
 
 _PATIENCE = 15.0
 """s that a node has to finish what it does after SIGINT."""
+_ENDED_WELL = (0, -signal.SIGINT)
+"""The latter of a node that was told to end while it was still being imported."""
 _SET_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
@@ -89,7 +91,7 @@ class Cell:
                 process.wait()
                 complaints.append(f'{name} did not end within {_PATIENCE:.0f} s and was killed.')
             else:
-                if process.returncode != 0:
+                if process.returncode not in _ENDED_WELL:
                     complaints.append(_last_words(name, process.returncode, output))
             output.close()
         return complaints

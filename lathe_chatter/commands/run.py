@@ -17,6 +17,7 @@ from lathe_chatter.commands.report import show_run
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.history import History, read_history
 from lathe_chatter.recording import read_run
+from lathe_chatter.recording.reader import RunReadError
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,
@@ -37,8 +38,8 @@ EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
 INTERRUPTED = 130
 _START_PATIENCE = 30.0
 """s for the nodes to find each other."""
-_SETTLING = 0.5
-"""s in which a listener that has found the lathe gets what was kept for it."""
+_READERS = 3
+"""Recorder, monitor and operator: the lathe cuts nothing before it has met them all."""
 _GRACE = 10.0
 """s of simulated time beyond a scenario's end for what the monitor is expected to say."""
 
@@ -73,7 +74,7 @@ def run(options: Namespace) -> int:
         warm_up()
     interrupted = _play(scenario, output, console)
     if interrupted and not _has_samples(output):
-        console.print('Interrupted before the lathe had cut anything.')
+        console.print('Interrupted before anything was recorded.')
         return INTERRUPTED
     history = read_history(output)
     figures = show_run(history, console)
@@ -87,7 +88,12 @@ def run(options: Namespace) -> int:
 
 def _has_samples(output: Path) -> bool:
     """Whether a run was begun and has samples of a lathe."""
-    return output.exists() and any(name.endswith('/samples') for name in read_run(output).topics)
+    try:
+        run = read_run(output)
+        topics = [name for name in run.topics if name.endswith('/samples')]
+        return any(True for _ in run.raw_messages(*topics)) if topics else False
+    except RunReadError:
+        return False
 
 
 def _play(scenario: Scenario, output: Path, console: Console) -> bool:
@@ -126,12 +132,11 @@ def _play(scenario: Scenario, output: Path, console: Console) -> bool:
                 cell.start(
                     'lathe',
                     'lathe_chatter.nodes.lathe_node',
-                    parameter_arguments(scenario.parameters),
+                    parameter_arguments({'await_readers': _READERS, **scenario.parameters}),
                 )
                 _follow(operator, executor, cell, scenario, console)
             except KeyboardInterrupt:
                 interrupted = True
-                _await_listeners(operator, executor)
             complaints = cell.end()
         if complaints:
             raise RunFailedError(' '.join(complaints))
@@ -157,17 +162,6 @@ def _await_nodes(operator: Operator, executor: Any, cell: Cell) -> None:
             'Another lathe is cutting in this ROS domain already: end it, or set ROS_DOMAIN_ID '
             'to another number.'
         )
-
-
-def _await_listeners(operator: Operator, executor: Any) -> None:
-    """Wait until those that listen to the lathe have found it: what it cut so far is theirs."""
-    until = time.monotonic() + _START_PATIENCE
-    settled = 0.0
-    while operator.time > 0.0 and time.monotonic() < until and settled < _SETTLING:
-        executor.spin_once(timeout_sec=0.05)
-        listeners = operator.listeners()
-        if {'run_recorder', 'chatter_monitor'} <= listeners:
-            settled += 0.05
 
 
 def _follow(

@@ -73,6 +73,9 @@ class LatheNode(ParameterNode):
         self._pending: Cut | None = None
 
         self._control = RunControl()
+        self._awaited: int = values['await_readers']
+        if self._awaited:
+            self._control.pause(pause=True)
         self._stamp_of_zero = 0
         tick = SECOND / values['tick_rate']
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
@@ -87,6 +90,8 @@ class LatheNode(ParameterNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / values['tick_rate'], self._wake, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
+        if self._awaited:
+            self.get_logger().info(f'Waiting for {self._awaited} readers of my samples.')
 
     # -- time ------------------------------------------------------------------------------
 
@@ -115,6 +120,8 @@ class LatheNode(ParameterNode):
 
     def _wake(self) -> None:
         """Make the ticks that are due."""
+        if self._awaited and self._topics.readers() >= self._awaited:
+            self.pause(pause=False)
         if self._control.state is not RunState.RUNNING:
             return
         now = self._now()
@@ -214,6 +221,7 @@ class LatheNode(ParameterNode):
     def pause(self, *, pause: bool) -> Answer:
         """Pause, or go on from where it was paused with nothing to catch up."""
         before = self._control.state
+        self._awaited = 0
         answer = self._control.pause(pause=pause)
         if self._control.state is not before:
             self._start_clock()

@@ -92,6 +92,10 @@ class LatheTopics:
             self._heard_scalars = [s for s in self._scalars if s[0].get_subscription_count()]
             self._heard_joints = self._joints.get_subscription_count() > 0
 
+    def readers(self) -> int:
+        """How many readers of the samples the publisher has met: they miss none from now on."""
+        return int(self._samples.get_subscription_count())
+
     def wait_for_readers(self, patience: float) -> None:
         """Wait until every reader has the samples, `patience` s at most."""
         self._samples.wait_for_all_acked(Duration(seconds=patience))

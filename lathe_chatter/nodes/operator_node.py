@@ -73,11 +73,6 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         """Whether every step was played."""
         return not self._steps and not self._in_flight
 
-    def listeners(self) -> set[str]:
-        """Names of the nodes that have found the lathe's samples."""
-        topic = self.resolve_topic_name('lathe/samples')
-        return {info.node_name for info in self.get_subscriptions_info_by_topic(topic)}
-
     # -- listening -------------------------------------------------------------------------
 
     def _on_samples(self, message: Float64MultiArray) -> None:

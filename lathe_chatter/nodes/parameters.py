@@ -109,6 +109,12 @@ LATHE = ParameterTable(
         _setup_row('sample_rate'),
         Row('seed', 0, SEED.meaning, SEED),
         Row('publish_clock', default=False, meaning='whether this node drives /clock'),
+        Row(
+            'await_readers',
+            0,
+            'readers of ~/samples that the first tick waits for, unless ~/pause says otherwise',
+            Quantity('', high=1000.0),
+        ),
     ),
     _derived_lathe,
 )

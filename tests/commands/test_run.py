@@ -125,6 +125,31 @@ def test_an_interrupted_run_is_complete_up_to_then(
     assert (output / 'metadata.yaml').is_file()
 
 
+def test_interrupted_before_the_first_sample_it_says_so(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    scenario = tmp_path / 'short.yaml'
+    # A lathe that waits for readers that never come: only an interrupt ends this run early.
+    parameters = f'{{real_time_factor: {PACE}, await_readers: 1000'
+    scenario.write_text(SHORT.replace(f'{{real_time_factor: {PACE}', parameters))
+    output = tmp_path / 'run'
+    with subprocess.Popen(
+        command('--scenario', str(scenario), '--output', str(output)),
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        end = time.monotonic() + 60.0
+        while not output.exists() and time.monotonic() < end:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert 'Interrupted before anything was recorded.' in said
+    assert 'Traceback' not in said
+
+
 def test_a_refused_step_ends_the_run_with_the_reason(
     tmp_path: Path, environment: dict[str, str]
 ) -> None:

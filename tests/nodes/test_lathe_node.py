@@ -20,6 +20,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from lathe_chatter.changes import Change, parse_change
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, BearingContact, Cut
+from lathe_chatter.nodes.control import RunState
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_from_message
 
@@ -119,6 +120,33 @@ def test_a_late_reader_gets_the_first_sample(lathe: LatheNode, bench: Bench) -> 
     bench.spin_until(lambda: len(kept) >= 5 and len(blocks(kept)) >= 5 * TICK, 'all samples')
     assert blocks(kept)[0, 0] == 1.0 / 1e4
     assert lathe.count_publishers('/lathe/samples') == 1
+
+
+def test_it_can_wait_for_its_readers(start: Callable[..., Any], bench: Bench) -> None:
+    node = start(LatheNode, await_readers=2)
+    volatile = DEEP  # to which nothing is sent that was kept
+    first = bench.listen(Float64MultiArray, '/lathe/samples', volatile)
+    status_of = bench.listen(DiagnosticArray, '/diagnostics')
+    bench.spin_until(lambda: status(status_of, 'pace'), 'a report')
+    assert not first
+    assert node.samples_taken == 0
+    second = bench.listen(Float64MultiArray, '/lathe/samples', volatile)
+    bench.spin_until(lambda: first and second, 'samples')
+    assert first[0] == second[0]
+    assert first[0].data[0] == 1.0 / 1e4
+
+
+@pytest.mark.parametrize('word', ['resume', 'stay paused'])
+def test_a_pause_by_hand_ends_the_wait(start: Callable[..., Any], bench: Bench, word: str) -> None:
+    node = start(LatheNode, await_readers=1)
+    bench.pause('/lathe', pause=word != 'resume')
+    if word == 'resume':
+        bench.spin_until(lambda: node.samples_taken, 'a tick')
+        return
+    messages = bench.listen(Float64MultiArray, '/lathe/samples')
+    bench.steps('/lathe', 1)
+    bench.spin_until(lambda: messages, 'the step')
+    assert node.run_state is RunState.PAUSED
 
 
 @pytest.mark.parametrize('factor', [0.0, 0.5, 1.0, 3.0])
