@@ -7,6 +7,7 @@ time themselves (changes.py).
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -18,6 +19,7 @@ import numpy as np
 from lathe_chatter.changes import Change, parse_change
 from lathe_chatter.model import Array, Cut, Machine, Mode
 from lathe_chatter.recording import Run, read_run
+from lathe_chatter.recording.identity import PARAMETERS
 from lathe_chatter.recording.reader import Samples
 
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
@@ -101,13 +103,16 @@ def read_history(path: Path) -> History:
     samples = run.samples()
     lathe = _topic(run, '/samples').removesuffix('/samples')
     parameters = _parameters(run, lathe)
+    changes = _changes(run, lathe)
+    for change in reversed(changes):
+        parameters |= change.old
     estimates = {name: _series(run, samples, f'/{name}') for name in _ESTIMATES}
     return History(
         path=Path(path),
         machine=_machine(parameters),
         start=Cut(**{n: v for n, v in parameters.items() if n in Cut.__dataclass_fields__}),
         samples=samples.columns,
-        changes=_changes(run, lathe),
+        changes=changes,
         flags=_flags(run, samples, estimates),
         estimates=estimates,
     )
@@ -119,12 +124,19 @@ def _topic(run: Run, ending: str) -> str:
 
 
 def _parameters(run: Run, lathe: str) -> dict[str, Any]:
-    """The parameters with which the lathe was started: it announces them as it declares them."""
+    """The parameters with which the lathe was started.
+
+    It announces them to the readers that it waits for. Where it waited for none, the recorder
+    has asked, perhaps after the first change; what that changed is told by `_changes`.
+    """
     found: dict[str, Any] = {}
     for recorded in run.messages('/parameter_events'):
         if recorded.message.node == lathe:
             for parameter in recorded.message.new_parameters:
                 found.setdefault(parameter.name, _value(parameter.value))
+    for note in run.notes():
+        if note.name == PARAMETERS + lathe:
+            found = {**json.loads(note.values['parameters']), **found}
     return found
 
 

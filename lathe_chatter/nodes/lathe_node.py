@@ -121,6 +121,7 @@ class LatheNode(ParameterNode):
     def _wake(self) -> None:
         """Make the ticks that are due."""
         if self._awaited and self._topics.readers() >= self._awaited:
+            self.announce()  # those who read samples may read events too
             self.pause(pause=False)
         if self._control.state is not RunState.RUNNING:
             return

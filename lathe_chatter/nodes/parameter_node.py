@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from rcl_interfaces.msg import ParameterType, SetParametersResult
+from rcl_interfaces.msg import ParameterEvent, ParameterType, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -60,6 +60,20 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         Args:
             changed: What the set named, all of one atomic set in one call.
         """
+
+    def announce(self) -> None:
+        """Publish every parameter of the table as an event again.
+
+        An event is not kept: those of the declarations are gone before anybody can listen.
+        """
+        event = ParameterEvent(node=self.get_fully_qualified_name())
+        event.stamp = self.get_clock().now().to_msg()
+        event.new_parameters = [
+            self.get_parameter(row.name).to_parameter_msg() for row in self._table
+        ]
+        for publisher in self.publishers:
+            if publisher.msg_type is ParameterEvent:
+                publisher.publish(event)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all or nothing; rclpy's services for one and for several come through here.

@@ -97,6 +97,16 @@ def test_without_clearance_nothing_is_flagged(tmp_path: Path, environment: dict[
     assert happened[1:] == ['depth 0.62 mm', 'end']
 
 
+def test_the_report_has_the_parameters_of_the_start(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    scenario = tmp_path / 'other.yaml'
+    start = '{real_time_factor: 2.0, spindle_speed_rpm: 4100, depth_of_cut: 0.0003}'
+    scenario.write_text(f'name: other\nduration: 0.5\nparameters: {start}\n')
+    figures = play(scenario, tmp_path / 'run', environment)
+    assert figures['occurrences'][0]['what'].startswith('start: 4100 rev/min, depth 0.3 mm')
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_is_complete_up_to_then(
     number: signal.Signals, tmp_path: Path, environment: dict[str, str]
