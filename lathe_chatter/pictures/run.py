@@ -9,15 +9,13 @@ import numpy as np
 
 from lathe_chatter.changes import on_the_shop_floor
 from lathe_chatter.history import History
-from lathe_chatter.model import Array, BearingContact
+from lathe_chatter.model import BearingContact
+from lathe_chatter.pictures.style import ALARM, NEUTRAL, TOOL, WORKPIECE, envelope, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's palette: told apart with any colour vision.
-TOOL, WORKPIECE, ALARM, NEUTRAL = '#0072B2', '#D55E00', '#CC79A7', '#555555'
 _MICRO = 1e6
-_BINS = 1500
 _WINDOW = 0.25
 """s of cutting that a phase portrait or a spectrum shows."""
 
@@ -29,12 +27,7 @@ def draw_run(history: History, path: Path) -> None:
         history: The run.
         path: Of the PNG file to write.
     """
-    # Not pyplot: it would choose a backend and keep every figure in a global list.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 10.5), layout='constrained')
-    FigureCanvasAgg(figure)
+    figure = new_figure(12.0, 10.5)
     rows = figure.add_gridspec(4, 3, height_ratios=[1.1, 1.1, 0.8, 1.3])
     tool = figure.add_subplot(rows[0, :])
     workpiece = figure.add_subplot(rows[1, :], sharex=tool)
@@ -44,7 +37,7 @@ def draw_run(history: History, path: Path) -> None:
         (tool, 'tool', TOOL),
         (workpiece, 'workpiece', WORKPIECE),
     ):
-        _draw_envelope(axes, time, history.samples[f'{name}_displacement'] * _MICRO, colour)
+        envelope(axes, time, history.samples[f'{name}_displacement'] * _MICRO, colour)
         axes.set_ylabel(f'{name}\ndisplacement / µm')
         axes.tick_params(labelbottom=False)
     if history.start.bearing_contact is not BearingContact.NONE:
@@ -64,16 +57,6 @@ def draw_run(history: History, path: Path) -> None:
     for place, (title, moment) in enumerate(moments):
         _draw_moment(figure.add_subplot(rows[3, place]), history, title, moment)
     figure.savefig(path, dpi=110)
-
-
-def _draw_envelope(axes: Axes, time: Array, value: Array, colour: str) -> None:
-    """A long signal as the band between its smallest and largest values, never as 10^6 points."""
-    if len(value) <= 2 * _BINS:
-        axes.plot(time, value, color=colour, lw=0.8)
-        return
-    edges = np.linspace(0, len(value), _BINS + 1).astype(int)[:-1]
-    low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
-    axes.fill_between(time[edges], low, high, color=colour, lw=0.4)
 
 
 def _draw_growth(axes: Axes, history: History) -> None:

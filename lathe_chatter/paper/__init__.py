@@ -1,0 +1,18 @@
+"""The paper's 14 runs: reproduced, judged, and drawn as its tables and figures lay them out."""
+
+from __future__ import annotations
+
+from lathe_chatter.paper.findings import Findings, find
+from lathe_chatter.paper.reproduction import Literal, Reproduced, reproduce_run
+from lathe_chatter.paper.runs import PAPER_RUNS, Pace, PaperRun
+
+__all__ = [
+    'PAPER_RUNS',
+    'Findings',
+    'Literal',
+    'Pace',
+    'PaperRun',
+    'Reproduced',
+    'find',
+    'reproduce_run',
+]
