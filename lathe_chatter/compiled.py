@@ -45,7 +45,9 @@ def _numba_set(**options: Any) -> Iterator[None]:
             setattr(numba.config, name, value)
 
 
-def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Function], Function]:
+def compiled(
+    *, inline: bool = False, borrows: bool = False, nogil: bool = False
+) -> Callable[[Function], Function]:
     """A decorator for a function of plain numbers and arrays.
 
     It may call compiled functions of its own package only, see above. Floating point is strict
@@ -56,6 +58,8 @@ def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Function
 
     Args:
         inline: Whether callers take the code into theirs, for what is called in every step.
+        borrows: Whether it makes no array and only looks at those of its caller, so that the
+            references to them need not be counted: atomic operations, dearer than a step.
         nogil: Whether other Python threads may run meanwhile.
     """
 
@@ -63,6 +67,8 @@ def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Function
         folder = _cache_folder(Path(function.__code__.co_filename).parent)
         with _numba_set(CACHE_DIR=folder):
             options = {'cache': True, 'error_model': 'numpy', 'nogil': nogil}
+            if borrows:
+                options['_nrt'] = False  # as Numba's own helpers do
             result: Any = numba.njit(forceinline=inline, **options)(function)
         if result is function:  # NUMBA_DISABLE_JIT: plain Python, for a debugger
             return function

@@ -180,15 +180,12 @@ class VirtualLathe:
             if found:
                 self._found.append(self._event_space[:found].copy())
             if status == layout.SURFACE_FULL:
-                self._state.nodes = surface.grown(self._state.nodes)
+                nodes = self._state.nodes
+                self._state.nodes = surface.with_room(nodes, 2 * len(nodes))
             elif status == layout.EVENTS_FULL:
                 self._event_space = np.empty((2 * len(self._event_space), 3))
         if status == layout.GUARD:
-            time = (self.samples_taken + 1) / self.sample_rate
-            self._state.guard = (
-                f'The run ended at {time:.4f} s: a displacement passed '
-                f'{self.setup.displacement_limit:g} m, beyond which this machine has no meaning.'
-            )
+            self._state.end()
         return out[:rows]
 
     def retune(self, cut: Cut) -> None:

@@ -126,6 +126,15 @@ class LatheState:
         self.numbers[layout.TOOL_V] += impulse / self.setup.machine.tool.mass
         self._corner(1)
 
+    def end(self) -> None:
+        """Note that the next sample would lie beyond what the machine means."""
+        setup = self.setup
+        time = (int(self.counts[layout.SAMPLES]) + 1) / setup.sample_rate
+        self.guard = (
+            f'The run ended at {time:.4f} s: a displacement passed '
+            f'{setup.displacement_limit:g} m, beyond which this machine has no meaning.'
+        )
+
     def copy(self) -> LatheState:
         """The same state with a memory of its own, no larger than it must be."""
         nodes = self.nodes[: int(self.counts[layout.HEAD]) + 1].copy()

@@ -12,13 +12,13 @@ from lathe_chatter.integrator.propagation import IN_CUT, relative_acceleration
 from lathe_chatter.model import Array, Integers
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def lower(order: int, other: int) -> int:
     """The lower of two orders of a corner, where 0 stands for none."""
     return max(order, other) if order == 0 or other == 0 else min(order, other)
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def finish_corner(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, matrices: Array,
     force: float, speed: float, acceleration: float,
@@ -33,8 +33,8 @@ def finish_corner(
         xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
         met = numbers[layout.MET] - numbers[layout.FED]
         bend = relative_acceleration(matrices[regime], xt, vt, xw, vw, met, force)
-        slope = (settings[layout.FEED_SPEED] + vt - vw) / speed
-        curvature = (bend - slope * acceleration) / (speed * speed)
+        slope = (settings[layout.FEED_SPEED] + vt - vw) * (1.0 / speed)
+        curvature = (bend - slope * acceleration) * (1.0 / (speed * speed))
     nodes[head, surface.SLOPE_AFTER] = slope
     nodes[head, surface.CURVATURE_AFTER] = curvature
     if order > 0:

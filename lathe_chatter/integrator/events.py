@@ -12,7 +12,7 @@ _ITERATIONS = 60
 _CLOSE = 1e-15
 
 
-@compiled()
+@compiled(borrows=True)
 def _root(series: Array, terms: int, sign: float, low: float, high: float, place: float) -> float:
     """The root of sign * series between `low` (positive there) and `high` (negative).
 
@@ -40,7 +40,7 @@ def _root(series: Array, terms: int, sign: float, low: float, high: float, place
     return place
 
 
-@compiled()
+@compiled(borrows=True)
 def _turning_point(series: Array, terms: int, rising_first: bool) -> float:
     """Where the slope changes sign between 0 and 1, by bisection: it happens twice a period."""
     low, high = 0.0, 1.0
@@ -55,7 +55,7 @@ def _turning_point(series: Array, terms: int, rising_first: bool) -> float:
     return 0.5 * (low + high)
 
 
-@compiled()
+@compiled(borrows=True)
 def first_crossing(series: Array, terms: int, sign: float) -> float:
     """Where sign * series, a margin that should stay positive, first falls below zero.
 
@@ -90,13 +90,14 @@ def first_crossing(series: Array, terms: int, sign: float) -> float:
     return place
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def may_turn_back(
     start: float, slope: float, end: float, slope_end: float, duration: float
 ) -> bool:
-    """Whether a margin may become negative in a piece; False is certain.
+    """Whether a margin may become negative in a piece.
 
-    Either it is negative at the end, or it turns inside and its tangent at the start, which
-    lies below the curve, would take it below zero.
+    Either it is negative at the end, or it turns inside and its tangent at the start would take
+    it below zero: where it turns upwards it is convex, and the curve lies above that tangent.
     """
-    return end < 0.0 or (slope < 0.0 < slope_end and start + slope * duration < 0.0)
+    turns = (slope < 0.0) & (slope_end > 0.0) & (start + slope * duration < 0.0)
+    return (end < 0.0) | turns

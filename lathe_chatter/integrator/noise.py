@@ -22,7 +22,7 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S11, _S27, _S30, _S31 = np.uint64(11), np.uint64(27), np.uint64(30), np.uint64(31)
 
 
-@compiled()
+@compiled(borrows=True)
 def _mixed(word: np.uint64) -> np.uint64:
     """The finaliser of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014)."""
     word = (word ^ (word >> _S30)) * _MIX_1
@@ -30,7 +30,7 @@ def _mixed(word: np.uint64) -> np.uint64:
     return word ^ (word >> _S31)
 
 
-@compiled()
+@compiled(borrows=True)
 def standard_normal(seed: int, stream: int, counter: int) -> float:
     """A standard normal number by Box and Muller from two hashed words."""
     key = _mixed(np.uint64(seed) * _GOLDEN + np.uint64(stream))

@@ -48,7 +48,7 @@ _MOST_FLIPS = 32
 rounding cannot decide is no reason to stand still."""
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def _solve_series(
     numbers: Array, regime: int, mechanics: Array, force: float, scratch: Scratch
 ) -> None:
@@ -65,7 +65,7 @@ def _solve_series(
     )
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def _solve(
     numbers: Array, regime: int, mechanics: Array, matrices: Array, force: float, step: float,
     scratch: Scratch,
@@ -87,7 +87,7 @@ def _solve(
         propagation.state_at(scratch.tool, scratch.workpiece, 1.0, piece[DURATION], end)
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def _find_event(
     numbers: Array, regime: int, mechanics: Array, settings: Array, force: float, scratch: Scratch
 ) -> tuple[float, int]:
@@ -133,7 +133,7 @@ def _find_event(
     return (place, event) if place <= 1.0 else (NEVER, layout.NO_EVENT)
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def _leave_surface(
     counts: Integers, nodes: Array, settings: Array, matrices: Array, force: float, step: float,
     scratch: Scratch,
@@ -147,15 +147,15 @@ def _leave_surface(
             matrices[regime], end[0], end[1], end[2], end[3], piece[MET_1], force
         )
         height = piece[FED_1] + end[0] - end[2]
-        slope = (settings[layout.FEED_SPEED] + end[1] - end[3]) / speed
-        curvature = (bend - slope * piece[SPEED_SLOPE_1]) / (speed * speed)
+        slope = (settings[layout.FEED_SPEED] + end[1] - end[3]) * (1.0 / speed)
+        curvature = (bend - slope * piece[SPEED_SLOPE_1]) * (1.0 / (speed * speed))
     else:
         pitch = min(pitch, nodes[counts[layout.POINTER] + 1, surface.PITCH])
     counts[layout.HEAD] += 1
     surface.write_node(nodes, counts[layout.HEAD], piece[ANGLE_1], height, slope, curvature, pitch)
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def _move_on(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, node: int,
     at_node: bool, ramp_ends: bool, scratch: Scratch,
@@ -196,7 +196,7 @@ def _move_on(
         numbers[layout.FED] = 0.0
 
 
-@compiled()
+@compiled(borrows=True)
 def take_step(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, mechanics: Array,
     matrices: Array, force: float, events: Array, found: int, scratch: Scratch,
@@ -238,7 +238,7 @@ def take_step(
         piece[MET_0] = numbers[layout.MET] - numbers[layout.FED]
         piece[RATE_0] = numbers[layout.MET_SLOPE] * speed - settings[layout.FEED_SPEED]
         piece[BEND_0] = (
-            numbers[layout.MET_CURVATURE] * speed * speed
+            numbers[layout.MET_CURVATURE] * (speed * speed)
             + numbers[layout.MET_SLOPE] * acceleration
         )
         regime, left = counts[layout.REGIME], numbers[layout.LEFT]

@@ -37,7 +37,7 @@ class Scratch(NamedTuple):
 PIECE_SIZE = 16
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def add(high: float, low: float, increment: float) -> tuple[float, float]:
     """Compensated addition: a turn of 10^5 steps sums as exactly as one step."""
     increment += low
@@ -45,7 +45,7 @@ def add(high: float, low: float, increment: float) -> tuple[float, float]:
     return total, increment - (total - high)
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def plan_piece(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, limit: float,
     merge: float, piece: Array,
@@ -111,7 +111,7 @@ def plan_piece(
     piece[MET_1] = piece[HEIGHT_1] - piece[FED_1]
     piece[RATE_1] = piece[SLOPE_1] * piece[SPEED_1] - feed
     piece[BEND_1] = (
-        piece[CURVATURE_1] * piece[SPEED_1] * piece[SPEED_1]
+        piece[CURVATURE_1] * (piece[SPEED_1] * piece[SPEED_1])
         + piece[SLOPE_1] * piece[SPEED_SLOPE_1]
     )
     return node, at_node, ramp_ends

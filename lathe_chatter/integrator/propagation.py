@@ -50,7 +50,7 @@ REGIMES = 4
 """A regime is the sum of IN_CUT and ENGAGED where they hold."""
 
 
-@compiled()
+@compiled(borrows=True)
 def quintic(u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array) -> None:
     """Coefficients (6,) of the quintic on [0, 1] with these values, slopes and curvatures."""
     rise = u1 - u0 - d0 - 0.5 * e0
@@ -64,7 +64,7 @@ def quintic(u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, ou
     out[5] = 6.0 * rise - 3.0 * steep + 0.5 * bend
 
 
-@compiled()
+@compiled(borrows=True)
 def solve_piece(
     state: Array,
     duration: float,
@@ -116,7 +116,7 @@ def solve_piece(
         a0, a1, b0, b1 = a1, a2, b1, b2
 
 
-@compiled()
+@compiled(borrows=True)
 def value_at(series: Array, terms: int, place: float) -> float:
     """A power series at `place`."""
     total: float = series[terms - 1]
@@ -125,7 +125,7 @@ def value_at(series: Array, terms: int, place: float) -> float:
     return total
 
 
-@compiled()
+@compiled(borrows=True)
 def slope_at(series: Array, terms: int, place: float) -> float:
     """The derivative of a power series at `place`."""
     total: float = (terms - 1) * series[terms - 1]
@@ -134,7 +134,7 @@ def slope_at(series: Array, terms: int, place: float) -> float:
     return total
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def value_and_slope(series: Array, terms: int, place: float) -> tuple[float, float]:
     """A power series and its derivative at `place`."""
     value, slope = series[terms - 1], 0.0
@@ -144,7 +144,7 @@ def value_and_slope(series: Array, terms: int, place: float) -> tuple[float, flo
     return value, slope
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def state_at(tool: Array, workpiece: Array, place: float, duration: float, state: Array) -> None:
     """Write the state (4,) at `place` of a solved piece that lasts `duration`, s."""
     state[0], tool_slope = value_and_slope(tool, TERMS, place)
@@ -152,7 +152,24 @@ def state_at(tool: Array, workpiece: Array, place: float, duration: float, state
     state[1], state[3] = tool_slope / duration, workpiece_slope / duration
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
+def response(
+    m0: float, m1: float, m2: float, m3: float, m4: float, m5: float, m6: float, m7: float,
+    m8: float, m9: float, m10: float, x0: float, x1: float, x2: float, x3: float,
+    u0: float, u1: float, u2: float, u3: float, u4: float, u5: float,
+) -> float:  # fmt: skip
+    """One component of the state after a whole step: a row of the matrix times its inputs.
+
+    The order of the sums is stated here once, for one lathe and for many: equal bits.
+    """
+    return (
+        (m0 * x0 + m1 * x1) + (m2 * x2 + m3 * x3)
+        + ((m4 * u0 + m5 * u1) + (m6 * u2 + m7 * u3))
+        + ((m8 * u4 + m9 * u5) + m10)
+    )  # fmt: skip
+
+
+@compiled(inline=True, borrows=True)
 def whole_step(
     m: Array, x0: float, x1: float, x2: float, x3: float,
     u0: float, u1: float, u2: float, u3: float, u4: float, u5: float,
@@ -168,33 +185,46 @@ def whole_step(
         The state at the end, in the same order.
     """
     return (
-        (m[0, 0] * x0 + m[1, 0] * x1) + (m[2, 0] * x2 + m[3, 0] * x3)
-        + ((m[4, 0] * u0 + m[5, 0] * u1) + (m[6, 0] * u2 + m[7, 0] * u3))
-        + ((m[8, 0] * u4 + m[9, 0] * u5) + m[10, 0]),
-        (m[0, 1] * x0 + m[1, 1] * x1) + (m[2, 1] * x2 + m[3, 1] * x3)
-        + ((m[4, 1] * u0 + m[5, 1] * u1) + (m[6, 1] * u2 + m[7, 1] * u3))
-        + ((m[8, 1] * u4 + m[9, 1] * u5) + m[10, 1]),
-        (m[0, 2] * x0 + m[1, 2] * x1) + (m[2, 2] * x2 + m[3, 2] * x3)
-        + ((m[4, 2] * u0 + m[5, 2] * u1) + (m[6, 2] * u2 + m[7, 2] * u3))
-        + ((m[8, 2] * u4 + m[9, 2] * u5) + m[10, 2]),
-        (m[0, 3] * x0 + m[1, 3] * x1) + (m[2, 3] * x2 + m[3, 3] * x3)
-        + ((m[4, 3] * u0 + m[5, 3] * u1) + (m[6, 3] * u2 + m[7, 3] * u3))
-        + ((m[8, 3] * u4 + m[9, 3] * u5) + m[10, 3]),
+        response(
+            m[0, 0], m[1, 0], m[2, 0], m[3, 0], m[4, 0], m[5, 0], m[6, 0], m[7, 0], m[8, 0],
+            m[9, 0], m[10, 0], x0, x1, x2, x3, u0, u1, u2, u3, u4, u5,
+        ),
+        response(
+            m[0, 1], m[1, 1], m[2, 1], m[3, 1], m[4, 1], m[5, 1], m[6, 1], m[7, 1], m[8, 1],
+            m[9, 1], m[10, 1], x0, x1, x2, x3, u0, u1, u2, u3, u4, u5,
+        ),
+        response(
+            m[0, 2], m[1, 2], m[2, 2], m[3, 2], m[4, 2], m[5, 2], m[6, 2], m[7, 2], m[8, 2],
+            m[9, 2], m[10, 2], x0, x1, x2, x3, u0, u1, u2, u3, u4, u5,
+        ),
+        response(
+            m[0, 3], m[1, 3], m[2, 3], m[3, 3], m[4, 3], m[5, 3], m[6, 3], m[7, 3], m[8, 3],
+            m[9, 3], m[10, 3], x0, x1, x2, x3, u0, u1, u2, u3, u4, u5,
+        ),
     )  # fmt: skip
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
+def bend(
+    a0: float, a1: float, a2: float, a3: float, on_surface: float, on_force: float,
+    constant: float, x0: float, x1: float, x2: float, x3: float, met: float, force: float,
+) -> float:  # fmt: skip
+    """r'' from the last rows of a matrix, in one order of the sums like `response`."""
+    return ((a0 * x0 + a1 * x1) + (a2 * x2 + a3 * x3)) + (
+        (on_surface * met + on_force * force) + constant
+    )
+
+
+@compiled(inline=True, borrows=True)
 def relative_acceleration(
     m: Array, x0: float, x1: float, x2: float, x3: float, met: float,
     force: float,
 ) -> float:  # fmt: skip
     """r'' = x_t'' - x_wp'' of a state that meets the surface at `met`, m/s2."""
-    result: float = (
-        ((m[12, 0] * x0 + m[12, 1] * x1) + (m[12, 2] * x2 + m[12, 3] * x3))
-        + (m[13, 0] * met + m[13, 1] * force)
-        + m[13, 2]
-    )
-    return result
+    return bend(
+        m[12, 0], m[12, 1], m[12, 2], m[12, 3], m[13, 0], m[13, 1], m[13, 2],
+        x0, x1, x2, x3, met, force,
+    )  # fmt: skip
 
 
 @compiled()

@@ -23,7 +23,7 @@ from lathe_chatter.integrator.samples import write_sample
 from lathe_chatter.model import Array, Integers
 
 
-@compiled()
+@compiled(borrows=True)
 def take_quiet_steps(
     numbers: Array,
     counts: Integers,

@@ -10,7 +10,7 @@ from lathe_chatter.integrator.propagation import IN_CUT
 from lathe_chatter.model import Array, Integers
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def write_sample(
     out: Array, row: int, time: float, angle: float, xt: float, vt: float, xw: float, vw: float,
     chip: float, force: float,
@@ -21,7 +21,7 @@ def write_sample(
     out[row, 6], out[row, 7] = chip, force
 
 
-@compiled()
+@compiled(borrows=True)
 def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: int) -> None:
     """Add to a sample what sensors see beside the motion: runout and their own noise."""
     turn = 2.0 * math.pi * (out[row, 1] % 1.0)
@@ -37,7 +37,7 @@ def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: i
         )
 
 
-@compiled()
+@compiled(borrows=True)
 def write_present(numbers: Array, counts: Integers, settings: Array, out: Array, row: int) -> None:
     """Count and write the sample of the present state."""
     counts[layout.SAMPLES] += 1

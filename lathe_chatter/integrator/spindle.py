@@ -15,7 +15,7 @@ from lathe_chatter.compiled import compiled
 _NEWTON_STEPS = 20
 
 
-@compiled()
+@compiled(borrows=True)
 def speed_and_slope(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> tuple[float, float]:
@@ -26,7 +26,7 @@ def speed_and_slope(
     return base * factor, slope * factor + base * swing
 
 
-@compiled()
+@compiled(borrows=True)
 def turned(
     time: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
@@ -56,7 +56,7 @@ def turned(
     return even + amplitude * swing
 
 
-@compiled()
+@compiled(borrows=True)
 def time_to_turn(
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:

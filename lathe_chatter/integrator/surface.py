@@ -19,7 +19,7 @@ import numpy as np
 from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Array
 
-# One node is one cache line of 8 numbers.
+# One node is one cache line of 8 numbers, see `empty_nodes`.
 (
     ANGLE,  # rev, of the current turn; the turn before is negative
     HEIGHT,  # S, m
@@ -31,6 +31,7 @@ from lathe_chatter.model import Array
     PITCH,  # rev per whole step when the surface was cut: how finely it is described
 ) = range(8)
 NODE_SIZE = 8
+_CACHE_LINE = 64
 
 SMOOTH = 99.0
 LAST_ORDER = 4.0
@@ -39,9 +40,24 @@ MERGE = 1e-9
 """Two instants closer than this part of a step are one."""
 
 
+def empty_nodes(*shape: int) -> Array:
+    """Room for nodes (*shape, NODE_SIZE), each in one line of the processor's cache."""
+    size = NODE_SIZE * math.prod(shape)
+    room = np.zeros(size + NODE_SIZE)
+    first = -room.ctypes.data % _CACHE_LINE // room.itemsize
+    return room[first : first + size].reshape(*shape, NODE_SIZE)
+
+
+def with_room(nodes: Array, capacity: int) -> Array:
+    """The same nodes (..., n, NODE_SIZE) with room for `capacity` of them."""
+    result = empty_nodes(*nodes.shape[:-2], capacity)
+    result[..., : nodes.shape[-2], :] = nodes
+    return result
+
+
 def fresh_surface(slope: float, capacity: int) -> Array:
     """A smooth surface before the first turn: S = slope * phi for phi <= 0 (capacity, 8)."""
-    nodes = np.zeros((capacity, NODE_SIZE))
+    nodes = empty_nodes(capacity)
     nodes[:2, ANGLE] = -1.0, 0.0
     nodes[:2, HEIGHT] = -slope, 0.0
     nodes[:2, SLOPE_BEFORE] = nodes[:2, SLOPE_AFTER] = slope
@@ -50,33 +66,41 @@ def fresh_surface(slope: float, capacity: int) -> Array:
     return nodes
 
 
-@compiled(inline=True)
-def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
-    """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
-    width = nodes[left + 1, ANGLE] - nodes[left, ANGLE]
-    place = (angle - nodes[left, ANGLE]) / width
-    d0 = nodes[left, SLOPE_AFTER] * width
-    e0 = nodes[left, CURVATURE_AFTER] * width * width
-    rise = nodes[left + 1, HEIGHT] - nodes[left, HEIGHT] - d0 - 0.5 * e0
-    steep = nodes[left + 1, SLOPE_BEFORE] * width - d0 - e0
-    bend = nodes[left + 1, CURVATURE_BEFORE] * width * width - e0
+@compiled(inline=True, borrows=True)
+def quintic_at(
+    angle0: float, height0: float, slope0: float, curvature0: float,
+    angle1: float, height1: float, slope1: float, curvature1: float, angle: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """S, dS/dphi and d2S/dphi2 at `angle` on the quintic with these values at two angles."""
+    width = angle1 - angle0
+    place = (angle - angle0) / width
+    d0 = slope0 * width
+    e0 = curvature0 * width * width
+    rise = height1 - height0 - d0 - 0.5 * e0
+    steep = slope1 * width - d0 - e0
+    bend = curvature1 * width * width - e0
     c3 = 10.0 * rise - 4.0 * steep + 0.5 * bend
     c4 = -15.0 * rise + 7.0 * steep - bend
     c5 = 6.0 * rise - 3.0 * steep + 0.5 * bend
-    height = nodes[left, HEIGHT] + place * (
-        d0 + place * (0.5 * e0 + place * (c3 + place * (c4 + place * c5)))
-    )
+    height = height0 + place * (d0 + place * (0.5 * e0 + place * (c3 + place * (c4 + place * c5))))
     slope = d0 + place * (e0 + place * (3.0 * c3 + place * (4.0 * c4 + place * 5.0 * c5)))
     curvature = e0 + place * (6.0 * c3 + place * (12.0 * c4 + place * 20.0 * c5))
     return height, slope / width, curvature / (width * width)
 
 
-def grown(nodes: Array) -> Array:
-    """The same nodes with room for twice as many."""
-    return np.concatenate([nodes, np.zeros_like(nodes)])
+@compiled(inline=True, borrows=True)
+def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
+    """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
+    right = left + 1
+    return quintic_at(
+        nodes[left, ANGLE], nodes[left, HEIGHT],
+        nodes[left, SLOPE_AFTER], nodes[left, CURVATURE_AFTER],
+        nodes[right, ANGLE], nodes[right, HEIGHT],
+        nodes[right, SLOPE_BEFORE], nodes[right, CURVATURE_BEFORE], angle,
+    )  # fmt: skip
 
 
-@compiled(inline=True)
+@compiled(inline=True, borrows=True)
 def write_node(
     nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float,
     pitch: float,
@@ -90,7 +114,7 @@ def write_node(
     nodes[node, PITCH] = pitch
 
 
-@compiled()
+@compiled(borrows=True)
 def next_turn(nodes: Array, first: int, last: int, advance: float) -> None:
     """Forget what lies before node `first`, and count angle and feed from the new turn on.
 

@@ -79,8 +79,13 @@ def test_a_new_turn_moves_the_origin_and_nothing_else() -> None:
         assert new[1:] == pytest.approx(old[1:], rel=1e-9)
 
 
-def test_growing_keeps_every_bit() -> None:
+def test_room_for_more_nodes_keeps_every_bit() -> None:
     nodes = _nodes([-0.2, 0.1, 0.4])
-    more = surface.grown(nodes)
-    assert len(more) == 2 * len(nodes)
+    more = surface.with_room(nodes, 100)
+    assert more.shape == (100, surface.NODE_SIZE)
     assert np.array_equal(more[: len(nodes)], nodes)
+    assert not more[len(nodes) :].any()
+
+
+def test_a_node_lies_in_one_line_of_the_cache() -> None:
+    assert all(surface.empty_nodes(3, n).ctypes.data % 64 == 0 for n in range(1, 20))
