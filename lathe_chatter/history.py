@@ -7,20 +7,20 @@ time themselves (changes.py).
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lathe_chatter.changes import Change, parse_change
-from lathe_chatter.model import Array, Cut, Machine, Mode
+from lathe_chatter.changes import Change
+from lathe_chatter.lathe_parameters import cut_from, machine_from
+from lathe_chatter.model import Array, Cut, Machine
 from lathe_chatter.recording import Run, read_run
-from lathe_chatter.recording.identity import PARAMETERS
 from lathe_chatter.recording.reader import Samples
+from lathe_chatter.recording.told import told_by
 
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 
@@ -102,17 +102,14 @@ def read_history(path: Path) -> History:
     run = read_run(path)
     samples = run.samples()
     lathe = _topic(run, '/samples').removesuffix('/samples')
-    parameters = _parameters(run, lathe)
-    changes = _changes(run, lathe)
-    for change in reversed(changes):
-        parameters |= change.old
+    told = told_by(run, lathe)
     estimates = {name: _series(run, samples, f'/{name}') for name in _ESTIMATES}
     return History(
         path=Path(path),
-        machine=_machine(parameters),
-        start=Cut(**{n: v for n, v in parameters.items() if n in Cut.__dataclass_fields__}),
+        machine=machine_from(told.parameters),
+        start=cut_from(told.parameters),
         samples=samples.columns,
-        changes=changes,
+        changes=list(told.changes),
         flags=_flags(run, samples, estimates),
         estimates=estimates,
     )
@@ -121,56 +118,6 @@ def read_history(path: Path) -> History:
 def _topic(run: Run, ending: str) -> str:
     """The topic of the run with this ending, empty where there is none."""
     return next((name for name in sorted(run.topics) if name.endswith(ending)), '')
-
-
-def _parameters(run: Run, lathe: str) -> dict[str, Any]:
-    """The parameters with which the lathe was started.
-
-    It announces them to the readers that it waits for. Where it waited for none, the recorder
-    has asked, perhaps after the first change; what that changed is told by `_changes`.
-    """
-    found: dict[str, Any] = {}
-    for recorded in run.messages('/parameter_events'):
-        if recorded.message.node == lathe:
-            for parameter in recorded.message.new_parameters:
-                found.setdefault(parameter.name, _value(parameter.value))
-    for note in run.notes():
-        if note.name == PARAMETERS + lathe:
-            found = {**json.loads(note.values['parameters']), **found}
-    return found
-
-
-def _value(value: Any) -> Any:
-    """What an rcl_interfaces ParameterValue holds."""
-    kinds = {1: 'bool_value', 2: 'integer_value', 3: 'double_value', 4: 'string_value'}
-    return getattr(value, kinds[value.type]) if value.type in kinds else None
-
-
-def _machine(parameters: Mapping[str, Any]) -> Machine:
-    """The machine among the parameters of a lathe."""
-
-    def mode(part: str, usual: Mode) -> Mode:
-        names = [entry.name for entry in fields(Mode)]
-        return Mode(**{n: parameters.get(f'{part}.{n}', getattr(usual, n)) for n in names})
-
-    usual = Machine()
-    plain = ('bearing_stiffness', 'cutting_coefficient')
-    return Machine(
-        tool=mode('tool', usual.tool),
-        workpiece=mode('workpiece', usual.workpiece),
-        **{name: parameters[name] for name in plain if name in parameters},
-    )
-
-
-def _changes(run: Run, lathe: str) -> list[Change]:
-    """The changes of the cut that the lathe logged."""
-    logger = lathe.lstrip('/').replace('/', '.')
-    found = [
-        parse_change(recorded.message.msg)
-        for recorded in run.messages('/rosout')
-        if recorded.message.name == logger
-    ]
-    return sorted(filter(None, found), key=lambda change: change.time)
 
 
 def _series(run: Run, samples: Samples, ending: str) -> Array:

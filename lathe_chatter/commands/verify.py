@@ -8,22 +8,31 @@ from pathlib import Path
 
 from rich.console import Console
 
-from lathe_chatter.recording import verify
+from lathe_chatter.recording import resimulate, verify
+from lathe_chatter.recording.resimulate import finding_of
 
 NAME = 'verify'
-HELP = 'prove a recorded run complete, or say what is missing (exit code 1)'
-EXAMPLE = 'lathe-chatter verify runs/20260401-120000'
+HELP = 'prove a recorded run complete and unaltered, or say what is wrong (exit code 1)'
+EXAMPLE = 'lathe-chatter verify runs/20260401-120000 --resimulate'
 
 
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument('run_path', type=Path, metavar='RUN', help='folder or file of a run')
+    parser.add_argument(
+        '--resimulate',
+        action='store_true',
+        help='also compute every sample again and compare it bit for bit',
+    )
     parser.add_argument('--json', action='store_true', help='print the figures as JSON')
 
 
 def run(options: Namespace) -> int:
     """Verify; 0 if nothing is missing, else 1."""
     found = verify(options.run_path)
+    if options.resimulate:
+        for again in resimulate(found.run):
+            found.findings.append(finding_of(again))
     console = Console(highlight=False, soft_wrap=True)
     if options.json:
         figures = {
@@ -40,6 +49,6 @@ def run(options: Namespace) -> int:
         text = f'{name}: {samples.samples} samples, {samples.first:g} s to {samples.last:g} s'
         console.print(text, markup=False)
     for finding in found.findings:
-        console.print(('LOST  ' if finding.loss else 'note  ') + finding.text, markup=False)
+        console.print(('WRONG  ' if finding.loss else 'note   ') + finding.text, markup=False)
     console.print('complete' if found.complete else 'NOT complete')
     return 0 if found.complete else 1

@@ -11,26 +11,20 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-from lathe_chatter.changes import change_sentence
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe_parameters import cut_from, lathe_from
 from lathe_chatter.model import Cut
 from lathe_chatter.nodes import simulation_services
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.lathe_meter import LatheMeter
+from lathe_chatter.nodes.lathe_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.pacing import SECOND, Pacer
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_table import Value
-from lathe_chatter.nodes.parameters import (
-    CUT_ROWS,
-    LATHE,
-    cut_from,
-    machine_from,
-    samples_per_tick,
-)
+from lathe_chatter.nodes.parameters import CUT_ROWS, LATHE, samples_per_tick
 from lathe_chatter.nodes.running import run_node
 from lathe_chatter.nodes.scheduling import ask_for_short_slices
 from lathe_chatter.warm_up import warm_up
@@ -69,8 +63,9 @@ class LatheNode(ParameterNode):
         self._sample_rate: float = values['sample_rate']
         self._samples_per_tick = samples_per_tick(self._sample_rate, values['tick_rate'])
         warm_up()  # compiled before the first tick is due
-        self._lathe = self._new_lathe()
+        self._lathe = lathe_from(values)
         self._pending: Cut | None = None
+        self._record = LatheRecord(self, values)
 
         self._control = RunControl()
         self._awaited: int = values['await_readers']
@@ -157,6 +152,7 @@ class LatheNode(ParameterNode):
         samples = self._lathe.advance(self._samples_per_tick)
         if len(samples):
             self._topics.publish(samples, self._stamp())
+            self._record.take(samples)
         if self._lathe.guard:
             self._end(self._lathe.guard)
         self._meter.note_tick(time.perf_counter_ns() - began, self._lathe)
@@ -166,18 +162,12 @@ class LatheNode(ParameterNode):
         self.get_logger().error(because)
         self._diagnostics.publish(self._statuses())
 
-    # -- the cut ---------------------------------------------------------------------------
+    def destroy_node(self) -> None:
+        """Finish its own record before the node goes."""
+        self._record.close()
+        super().destroy_node()
 
-    def _new_lathe(self) -> VirtualLathe:
-        values: Mapping[str, Any] = self.values
-        return VirtualLathe(
-            machine_from(values),
-            cut_from(values),
-            sample_rate=values['sample_rate'],
-            tool_leaves_cut=values['tool_leaves_cut'],
-            spindle_acceleration=values['spindle_acceleration'],
-            seed=values['seed'],
-        )
+    # -- the cut ---------------------------------------------------------------------------
 
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Queue the new cut for the next tick, or take the new pace at once."""
@@ -194,10 +184,9 @@ class LatheNode(ParameterNode):
             self._pacer.change(factor, self._now())
 
     def _retune(self, cut: Cut) -> None:
-        change = change_sentence(self._lathe.time, self._lathe.cut, cut)
+        before = self._lathe.cut
         self._lathe.retune(cut)
-        if change:
-            self.get_logger().info(change)
+        self._record.changed(self._lathe.time, before, cut)
 
     def _on_knock(self, message: Float64) -> None:
         try:
@@ -205,7 +194,7 @@ class LatheNode(ParameterNode):
         except ParameterError as error:
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
         else:
-            self.get_logger().info(f'At {self._lathe.time:.6f} s: knock of {message.data:g} N s.')
+            self._record.knocked(self._lathe.time, message.data)
 
     # -- control ---------------------------------------------------------------------------
 
@@ -241,7 +230,8 @@ class LatheNode(ParameterNode):
         """Start again at time zero with the present parameters: the same run, bit for bit."""
         answer = self._control.reset()
         self._pending = None
-        self._lathe = self._new_lathe()
+        before, self._lathe = self._lathe, lathe_from(self.values)
+        self._record.restarted(before.time, before.cut, self._lathe.cut)
         self._start_clock()
         self.get_logger().info(answer.message)
         return self._told(answer)
@@ -281,6 +271,7 @@ class LatheNode(ParameterNode):
         return [
             self._meter.pace(self._control, asked=self._factor, clock=self._clock_complaint()),
             self._meter.cutting(self._control, self._lathe),
+            *self._record.statuses(),
         ]
 
     def _clock_complaint(self) -> str:

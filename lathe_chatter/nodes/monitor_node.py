@@ -15,12 +15,13 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.errors import LatheChatterError, LayoutError
+from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.model import Array
 from lathe_chatter.nodes.continuity import Continuity, Joint
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.messages import samples_from_message
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameters import MONITOR, machine_from
+from lathe_chatter.nodes.parameters import MONITOR
 from lathe_chatter.nodes.running import run_node
 from lathe_chatter.warm_up import warm_up
 

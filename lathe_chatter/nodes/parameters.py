@@ -8,43 +8,13 @@ the sentence of a refusal and the tables of the README come from these rows.
 from __future__ import annotations
 
 import math
-from dataclasses import fields
-from typing import Any
 
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.lathe_setup import SEED, LatheSetup
-from lathe_chatter.model import Cut, Machine, Mode
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.nodes.parameter_table import ParameterTable, Row, Values, rows_of
 from lathe_chatter.quantities import Quantity, limits_of
-
-
-def cut_from(values: Values) -> Cut:
-    """The cut that a node's parameters describe.
-
-    Raises:
-        ParameterError: If a value is not allowed.
-    """
-    names = [entry.name for entry in fields(Cut)]
-    given: dict[str, Any] = {name: values[name] for name in names if name in values}
-    return Cut(**given)
-
-
-def machine_from(values: Values) -> Machine:
-    """The machine that a node's parameters describe; what they leave out has its default.
-
-    Raises:
-        ParameterError: If a value is not allowed.
-    """
-    usual = Machine()
-
-    def mode(part: str) -> Mode:
-        default = getattr(usual, part)
-        names = [entry.name for entry in fields(Mode)]
-        return Mode(**{n: values.get(f'{part}.{n}', getattr(default, n)) for n in names})
-
-    plain = ('bearing_stiffness', 'cutting_coefficient')
-    given: dict[str, Any] = {name: values[name] for name in plain if name in values}
-    return Machine(tool=mode('tool'), workpiece=mode('workpiece'), **given)
 
 
 def _derived_machine(given: Values) -> Values:
@@ -115,6 +85,7 @@ LATHE = ParameterTable(
             'readers of ~/samples that the first tick waits for, unless ~/pause says otherwise',
             Quantity('', high=1000.0),
         ),
+        Row('record', '', 'folder of a run that this node records by itself; empty: none'),
     ),
     _derived_lathe,
 )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import sys
 from datetime import datetime, timezone
 from importlib.metadata import version
+from pathlib import Path
+
+from lathe_chatter import __version__
 
 IDENTITY = 'lathe_chatter/made_by'
 """Name of the MCAP metadata record in each file of a run."""
@@ -20,14 +24,32 @@ RECOVERED = 'lathe_chatter/recovered'
 """Name of the record of a run that was recovered: from which, and what could not be read."""
 
 
+_CORE = ('integrator/*.py', 'compiled.py', 'lathe.py', 'lathe_state.py', 'model.py')
+
+
+def core_identity() -> dict[str, str]:
+    """What the bits of a simulated sample depend on: the code of the lathe, and below it."""
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    for pattern in _CORE:
+        for file in sorted(package.glob(pattern)):
+            digest.update(file.read_bytes())
+    return {
+        'lathe_chatter': __version__,
+        'core': digest.hexdigest()[:16],
+        **{name: version(name) for name in ('numpy', 'scipy', 'numba', 'llvmlite')},
+        'machine': platform.machine(),
+    }
+
+
 def identity() -> dict[str, str]:
     """Who records, on what, since when."""
     return {
-        'lathe_chatter': version('lathe_chatter'),
+        **core_identity(),
         'mcap': version('mcap'),
         'python': platform.python_version(),
         'system': f'{platform.system()} {platform.release()}',
-        'processor': f'{os.cpu_count()} x {platform.machine()}',
+        'processors': str(os.cpu_count()),
         'host': platform.node(),
         'command': ' '.join(sys.argv),
         'started': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),

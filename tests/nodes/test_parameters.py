@@ -8,15 +8,10 @@ from typing import Any
 import pytest
 
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.lathe_parameters import cut_from, machine_from
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.nodes.parameter_table import Row
-from lathe_chatter.nodes.parameters import (
-    LATHE,
-    MONITOR,
-    cut_from,
-    machine_from,
-    samples_per_tick,
-)
+from lathe_chatter.nodes.parameters import LATHE, MONITOR, samples_per_tick
 
 CONTRACT = {
     'spindle_speed_rpm': (3000.0, 'rev/min', True),
@@ -44,6 +39,7 @@ CONTRACT = {
     'sample_rate': (1e4, 'Hz', False),
     'seed': (0, '', False),
     'publish_clock': (False, '', False),
+    'record': ('', '', False),
 }
 
 

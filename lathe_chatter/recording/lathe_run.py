@@ -1,0 +1,137 @@
+"""A run written by whoever has the lathe itself: no ROS, the same files, equal arrays."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lathe_chatter.model import Array
+from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity
+from lathe_chatter.recording.ros_messages import (
+    LOG_TYPE,
+    PARAMETER_EVENT_TYPE,
+    log_bytes,
+    message_bytes,
+    parameters_bytes,
+    samples_bytes,
+    topic_of_type,
+)
+from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.recording.writer import RunWriter
+
+_COMMIT_PERIOD = 0.25
+"""s between two commits: what a kill can lose."""
+_SECOND = 10**9
+
+
+class LatheRun:
+    """Records one lathe: samples, parameters, and the sentences of what happens to the cut.
+
+    What it leaves is read, verified, resimulated and reported as a run of the recorder is. As a
+    context it closes itself.
+
+    Args:
+        folder: To make.
+        parameters: Of the lathe at its start, by name (`lathe_parameters.parameters_of`).
+        name: Of the lathe, beginning with a slash: its topics are below.
+        simulated: Whether messages are dated by simulated time since now, instead of when they
+            were written.
+        options: As for `RunWriter`.
+
+    Raises:
+        RunExistsError: If the folder exists.
+        OSError: If it cannot be made or written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        parameters: Mapping[str, Any],
+        *,
+        name: str = '/lathe',
+        simulated: bool = False,
+        **options: Any,
+    ) -> None:
+        """Make the run, with its parameters in it."""
+        self.name = name
+        self.writer = RunWriter(folder, **options)
+        self._samples = f'{name}/samples'
+        self._begun = self._now = time.time_ns()
+        self._simulated = simulated
+        self._sequences: dict[str, int] = {}
+        self._committed = time.monotonic()
+        values = {'parameters': json.dumps(dict(parameters)), 'log_time': str(self._begun)}
+        self.writer.note(IDENTITY, identity())
+        self.writer.note(PARAMETERS + name, values)
+        for topic, kind in (
+            (self._samples, SAMPLES_TYPE),
+            ('/rosout', LOG_TYPE),
+            ('/parameter_events', PARAMETER_EVENT_TYPE),
+        ):
+            self.writer.add_topic(topic_of_type(topic, kind))
+        announced = parameters_bytes(name, dict(parameters), self._begun)
+        self._write('/parameter_events', announced)
+
+    def take(self, samples: Array) -> None:
+        """Write a block of samples (n, 8), n > 0; every 0.25 s also put it all on disk.
+
+        Raises:
+            LatheChatterError: If the disk has too little room left.
+            OSError: If it refuses.
+        """
+        if self._simulated:
+            self._now = self._begun + round(float(samples[-1, 0]) * _SECOND)
+        self._write(self._samples, samples_bytes(samples))
+        if time.monotonic() - self._committed > _COMMIT_PERIOD:
+            self.commit()
+
+    def tell(self, sentence: str) -> None:
+        """Write what happened to the cut, a sentence of `lathe_chatter.changes`."""
+        logger = self.name.lstrip('/').replace('/', '.')
+        self._write('/rosout', log_bytes(logger, sentence, self._stamp()))
+
+    def publish(self, topic: str, kind: str, **fields: Any) -> None:
+        """Write a message of another topic, as `std_msgs/msg/Bool` with `data=True`."""
+        self.writer.add_topic(topic_of_type(topic, kind))
+        self._write(topic, message_bytes(kind, **fields))
+
+    def commit(self) -> None:
+        """Put everything written so far on disk.
+
+        Raises:
+            LatheChatterError: If the disk has too little room left.
+            OSError: If it refuses.
+        """
+        self._committed = time.monotonic()
+        self.writer.commit()
+
+    def close(self) -> None:
+        """Finish the run.
+
+        Raises:
+            OSError: If the disk refuses.
+        """
+        self.writer.close()
+
+    def abandon(self) -> None:
+        """Leave what the last commit left: the disk takes no more."""
+        self.writer.abandon()
+
+    def __enter__(self) -> LatheRun:  # noqa: PYI034 -- Self needs Python 3.11
+        """It is there."""
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Close, also after an exception."""
+        self.close()
+
+    def _stamp(self) -> int:
+        return self._now if self._simulated else time.time_ns()
+
+    def _write(self, topic: str, data: bytes) -> None:
+        number = self._sequences[topic] = self._sequences.get(topic, 0) + 1
+        stamp = self._stamp()
+        self.writer.write(topic, data, log_time=stamp, publish_time=stamp, sequence=number)

@@ -1,0 +1,128 @@
+"""Messages of ROS without ROS: rosbags knows the types that a run of ours needs."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from rosbags.typesys import Stores, get_typestore
+
+from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.recording.metadata import Topic
+from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
+
+LOG_TYPE = 'rcl_interfaces/msg/Log'
+PARAMETER_EVENT_TYPE = 'rcl_interfaces/msg/ParameterEvent'
+_SECOND = 10**9
+_INFO = 20
+_KINDS = ((bool, 1, 'bool_value'), (int, 2, 'integer_value'), (float, 3, 'double_value'))
+_TEXT, _TEXTS = 4, 9
+
+
+@cache
+def types() -> Any:
+    """The messages of Jazzy, as rosbags has them."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def topic_of_type(name: str, kind: str) -> Topic:
+    """A topic of a type that rosbags knows.
+
+    Raises:
+        KeyError: If it does not.
+    """
+    definition, _ = types().generate_msgdef(kind, ros_version=2)
+    return Topic(name, kind, definition, types().hash_rihs01(kind))
+
+
+def message_bytes(kind: str, **fields: Any) -> bytes:
+    """A message of a type, serialised."""
+    return bytes(types().serialize_cdr(types().types[kind](**fields), kind))
+
+
+def samples_bytes(samples: Array, columns: tuple[str, ...] = SAMPLE_COLUMNS) -> bytes:
+    """A block of samples (n, k), as the lathe publishes it."""
+    return _samples_head(len(samples), columns) + samples.astype('<f8', copy=False).tobytes()
+
+
+@cache
+def _samples_head(rows: int, columns: tuple[str, ...]) -> bytes:
+    """What stands before the numbers of a block."""
+    width = len(columns)
+    known = types().types
+    dim = known['std_msgs/msg/MultiArrayDimension']
+    layout = known['std_msgs/msg/MultiArrayLayout'](
+        dim=[
+            dim(label='sample', size=rows, stride=rows * width),
+            dim(label=','.join(columns), size=width, stride=width),
+        ],
+        data_offset=0,
+    )
+    whole = message_bytes(SAMPLES_TYPE, layout=layout, data=np.zeros(rows * width))
+    return whole[: len(whole) - 8 * rows * width]
+
+
+def log_bytes(name: str, sentence: str, stamp: int) -> bytes:
+    """A sentence as a node logs it on /rosout.
+
+    Args:
+        name: Of its logger.
+        sentence: What it says.
+        stamp: When, ns since the epoch.
+    """
+    return message_bytes(
+        LOG_TYPE,
+        stamp=_time(stamp),
+        level=_INFO,
+        name=name,
+        msg=sentence,
+        file='',
+        function='',
+        line=0,
+    )
+
+
+def parameters_bytes(node: str, values: dict[str, Any], stamp: int) -> bytes:
+    """The parameters of a node as it announces them on /parameter_events."""
+    parameter = types().types['rcl_interfaces/msg/Parameter']
+    return message_bytes(
+        PARAMETER_EVENT_TYPE,
+        stamp=_time(stamp),
+        node=node,
+        new_parameters=[parameter(name=n, value=_value(v)) for n, v in values.items()],
+        changed_parameters=[],
+        deleted_parameters=[],
+    )
+
+
+def _time(stamp: int) -> Any:
+    seconds, rest = divmod(stamp, _SECOND)
+    return types().types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=rest)
+
+
+def _value(value: Any) -> Any:
+    """A value as an rcl_interfaces ParameterValue."""
+    fields: dict[str, Any] = {
+        'type': 0,
+        'bool_value': False,
+        'integer_value': 0,
+        'double_value': 0.0,
+        'string_value': '',
+        'byte_array_value': np.zeros(0, np.uint8),
+        'bool_array_value': np.zeros(0, bool),
+        'integer_array_value': np.zeros(0, np.int64),
+        'double_array_value': np.zeros(0),
+        'string_array_value': [],
+    }
+    for kind, number, name in _KINDS:
+        if isinstance(value, kind):
+            return _filled(fields, number, name, value)
+    if isinstance(value, str):
+        return _filled(fields, _TEXT, 'string_value', value)
+    return _filled(fields, _TEXTS, 'string_array_value', [str(each) for each in value])
+
+
+def _filled(fields: dict[str, Any], number: int, name: str, value: Any) -> Any:
+    known = types().types['rcl_interfaces/msg/ParameterValue']
+    return known(**{**fields, 'type': number, name: value})

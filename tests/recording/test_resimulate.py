@@ -1,0 +1,160 @@
+"""Runs computed again: samples follow from their record, and what was altered is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lathe_chatter.changes import BEGINNING, BEGINNING_AGAIN, change_sentence, knock_sentence
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe_parameters import lathe_from, parameters_of
+from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine, Mode
+from lathe_chatter.recording import LatheRun, Resimulation, read_run, resimulate
+from lathe_chatter.recording.identity import IDENTITY, identity
+
+TICK = 20
+Alter = Callable[[int, Array], Array]
+
+
+def play(
+    folder: Path,
+    lathe: VirtualLathe,
+    *,
+    ticks: int = 100,
+    alter: Alter = lambda _k, a: a,
+    first: int = 0,
+    beginning: str = BEGINNING,
+    made_by: dict[str, str] | None = None,
+) -> None:
+    """Record a lathe to which everything happens that can; ticks before `first` are not kept."""
+    with LatheRun(folder, parameters_of(lathe)) as run:
+        if made_by is not None:
+            run.writer.note(IDENTITY, made_by)
+        if beginning:
+            run.tell(beginning)
+        for k in range(ticks):
+            if k in (30, 55):
+                speed, depth = (3333.3 + k, 0.0007 + 1e-5 * k / 3.0)
+                cut = lathe.cut.with_changes(spindle_speed_rpm=speed, depth_of_cut=depth)
+                run.tell(change_sentence(lathe.time, lathe.cut, cut))
+                lathe.retune(cut)
+            if k == 40:
+                run.tell(knock_sentence(lathe.time, 1.0 / 300.0))
+                lathe.knock(1.0 / 300.0)
+            samples = lathe.advance(TICK)
+            if k >= first:
+                run.take(alter(k, samples))
+
+
+def again(folder: Path) -> Resimulation:
+    (found,) = resimulate(read_run(folder, damaged=True))
+    return found
+
+
+@pytest.mark.parametrize(
+    'lathe',
+    [
+        VirtualLathe,
+        lambda: VirtualLathe(
+            Machine(Mode(0.06, 700.0, 0.03), bearing_stiffness=1e4),
+            Cut(force_noise=1e-3, sensor_noise=1e-7, runout=1e-6, depth_of_cut=0.001),
+            seed=7,
+            sample_rate=44100.0,
+        ),
+        lambda: VirtualLathe(
+            cut=Cut(speed_variation_amplitude=0.1, bearing_contact='seated'),
+            spindle_acceleration=3000.0,
+            tool_leaves_cut=False,
+        ),
+    ],
+    ids=['gap', 'noise', 'ramp'],
+)
+def test_a_run_with_changes_and_a_knock_follows_from_its_record(
+    lathe: Callable[[], VirtualLathe], tmp_path: Path
+) -> None:
+    play(tmp_path / 'run', lathe())
+    found = again(tmp_path / 'run')
+    assert found == Resimulation('/lathe/samples', compared=100 * TICK)
+    assert found.proven
+
+
+@pytest.mark.parametrize('column', range(len(SAMPLE_COLUMNS)))
+def test_one_altered_bit_is_found_and_named(column: int, tmp_path: Path) -> None:
+    was: list[float] = []
+
+    def alter(k: int, samples: Array) -> Array:
+        if k in (60, 70):
+            was.append(float(samples[5, column]))
+            samples[5, column] = np.nextafter(samples[5, column], np.inf)
+        return samples
+
+    play(tmp_path / 'run', VirtualLathe(), alter=alter)
+    found = again(tmp_path / 'run')
+    assert not found.proven
+    assert found.compared == 60 * TICK + 5
+    assert found.difference is not None
+    assert found.difference.time == (60 * TICK + 6) / 1e4
+    assert found.difference.column == SAMPLE_COLUMNS[column]
+    assert found.difference.computed == was[0]
+    assert found.difference.recorded == np.nextafter(was[0], np.inf)
+
+
+def test_a_sample_that_was_taken_out_does_not_hide_an_altered_one(tmp_path: Path) -> None:
+    def alter(k: int, samples: Array) -> Array:
+        if k == 80:
+            samples[0, 2] = -samples[0, 2]
+        return samples[:7] if k == 33 else samples
+
+    play(tmp_path / 'run', VirtualLathe(), alter=alter)
+    found = again(tmp_path / 'run')
+    assert found.difference is not None
+    assert (found.difference.time, found.difference.column) == (1601 / 1e4, 'tool_displacement')
+
+
+def test_a_run_without_its_head_is_compared_where_it_is(tmp_path: Path) -> None:
+    play(tmp_path / 'run', VirtualLathe(), first=35)
+    assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=65 * TICK)
+
+
+def test_a_record_that_began_midway_says_that_it_cannot_be_judged(tmp_path: Path) -> None:
+    lathe = VirtualLathe()
+    lathe.advance(500)
+    lathe.retune(Cut(depth_of_cut=0.001))  # nobody recorded it
+    play(tmp_path / 'run', lathe, beginning='')
+    found = again(tmp_path / 'run')
+    assert found.compared == 0
+    assert not found.proven
+    assert 'The record does not begin with the cut' in found.obstacle
+
+
+def test_a_reset_begins_again(tmp_path: Path) -> None:
+    lathe = VirtualLathe(cut=Cut(force_noise=1e-3), seed=3)
+    parameters = parameters_of(lathe)
+    with LatheRun(tmp_path / 'run', parameters) as run:
+        run.tell(BEGINNING)
+        run.take(lathe.advance(400))
+        deeper = lathe.cut.with_changes(depth_of_cut=0.0008)
+        run.tell(change_sentence(lathe.time, lathe.cut, deeper))
+        run.tell(BEGINNING_AGAIN)
+        lathe = lathe_from({**parameters, 'depth_of_cut': 0.0008})
+        run.take(lathe.advance(300))
+    assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=700)
+
+
+def test_a_run_of_other_software_is_not_called_altered(tmp_path: Path) -> None:
+    def alter(k: int, samples: Array) -> Array:
+        samples[3, 2] += 1e-18 * (k == 10)
+        return samples
+
+    play(tmp_path / 'here', VirtualLathe(), alter=alter)
+    here = again(tmp_path / 'here')
+    assert here.difference is not None
+    assert here.obstacle == ''
+    made_by = {**identity(), 'core': 'of yesterday'}
+    play(tmp_path / 'there', VirtualLathe(), alter=alter, made_by=made_by)
+    there = again(tmp_path / 'there')
+    assert there.difference == here.difference
+    assert there.obstacle.startswith('It was computed by other software: core of yesterday and ')
