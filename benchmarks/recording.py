@@ -92,7 +92,7 @@ def measure_writing() -> None:
             for k in range(300_000):
                 writer.write('/a', ready[k % 1000], log_time=START + k, publish_time=START)
                 if k % 25_000 == 0:
-                    writer.commit()
+                    writer.commit_soon()
         rate = 300_000 / (time.perf_counter() - began)
         print(f'writing: {rate / 1e3:.0f} thousand messages of 1 kB a second')
         held: list[float] = []
@@ -103,7 +103,7 @@ def measure_writing() -> None:
                 told = START + k * TICK
                 writer.write('/lathe/samples', data, log_time=told, publish_time=told)
                 if k % PER_COMMIT == PER_COMMIT - 1:
-                    writer.commit()
+                    writer.commit_soon()
                 held.append(time.perf_counter() - began)
         times = 1e3 * np.array(held)
         commits = times[PER_COMMIT - 1 :: PER_COMMIT]
@@ -123,7 +123,7 @@ def measure_reading() -> None:
                 told = START + k * TICK
                 writer.write('/lathe/samples', data, log_time=told, publish_time=told)
                 if k % PER_COMMIT == PER_COMMIT - 1:
-                    writer.commit()
+                    writer.commit_soon()
         for columns in ('tool_displacement', ','.join(SAMPLE_COLUMNS)):
             child = [sys.executable, __file__, '--read', str(place / 'run'), columns]
             subprocess.run(child, check=True)  # noqa: S603 -- ourselves
@@ -152,7 +152,7 @@ def record_for_ever(run: str) -> None:
         told = START + k * TICK
         writer.write('/lathe/samples', data, log_time=told, publish_time=told, sequence=k + 1)
         if k % PER_COMMIT == PER_COMMIT - 1:
-            writer.commit()
+            writer.commit_soon()
         os.write(1, (k + 1).to_bytes(8, 'little'))
         time.sleep(max(began + (k + 1) * TICK / 1e9 - time.monotonic(), 0.0))
 

@@ -204,7 +204,7 @@ class RecorderNode(ParameterNode):
         if self._writer is None:
             return
         try:
-            self._writer.commit()
+            self._writer.commit_soon()
         except (OSError, LatheChatterError) as error:
             self._fail(error)
 

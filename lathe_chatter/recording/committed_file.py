@@ -27,22 +27,17 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
-    Channel,
     DataEnd,
     Footer,
     Header,
     Metadata,
     MetadataIndex,
-    Schema,
     Statistics,
 )
 from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.background_sync import BackgroundSync
 from lathe_chatter.recording.open_chunk import ClosedChunk, OpenChunk, record_bytes
-
-_CHUNK_SIZE = 1 << 22
-"""Larger than what comes between two commits, which each end a chunk."""
 
 
 @dataclass
@@ -88,8 +83,6 @@ class CommittedFile:
         """Make the file and commit its empty beginning."""
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
         self._sync = BackgroundSync(self._descriptor)
-        self._described: dict[int, bytes] = {}
-        self._chunk = OpenChunk(self._described)
         self._schemas: list[bytes] = []
         self._channels: list[bytes] = []
         self._chunk_indexes = bytearray()
@@ -107,38 +100,21 @@ class CommittedFile:
         """Bytes on disk."""
         return self._body_start + len(self._tail)
 
-    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Add a schema; its number."""
-        number = len(self._schemas) + 1
-        schema = Schema(id=number, name=name, encoding=encoding, data=data)
-        self._schemas.append(record_bytes(schema))
-        return number
+    def add_channel(self, schema: bytes, channel: bytes) -> None:
+        """Add the record of a channel, and of its schema unless it is empty."""
+        if schema:
+            self._schemas.append(schema)
+        self._channels.append(channel)
 
-    def add_channel(self, topic: str, schema: int, metadata: Mapping[str, str]) -> int:
-        """Add a channel of CDR messages; its number."""
-        number = len(self._channels) + 1
-        channel = Channel(
-            id=number,
-            topic=topic,
-            message_encoding='cdr',
-            metadata=dict(metadata),
-            schema_id=schema,
-        )
-        self._channels.append(record_bytes(channel))
-        self._described[number] = self._schemas[schema - 1] + self._channels[-1]
-        return number
-
-    def add_message(
-        self, channel: int, log_time: int, publish_time: int, sequence: int, data: bytes
-    ) -> None:
-        """Add a message; times in ns since the epoch."""
-        self._chunk.add_message(channel, log_time, publish_time, sequence, data)
-        if self._chunk.size > _CHUNK_SIZE:
-            self._close_chunk()
+    def add_chunk(self, chunk: OpenChunk) -> None:
+        """Add a chunk of messages."""
+        closed = chunk.close(self._end)
+        self._body += closed.data
+        self._chunk_indexes += closed.index
+        self._contents = self._contents.with_chunk(closed)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add named values, outside the stream of messages."""
-        self._close_chunk()
         data = record_bytes(Metadata(name=name, metadata=dict(values)))
         index = MetadataIndex(offset=self._end, length=len(data), name=name)
         self._other_indexes += record_bytes(index)
@@ -147,7 +123,6 @@ class CommittedFile:
 
     def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
         """Attach a file of another kind, dated in ns since the epoch."""
-        self._close_chunk()
         named = {'name': name, 'media_type': media_type}
         attachment = record_bytes(Attachment(create_time=time, log_time=time, data=data, **named))
         index = AttachmentIndex(
@@ -173,7 +148,6 @@ class CommittedFile:
                 The file then stays as the commit before left it.
         """
         self._sync.check()
-        self._close_chunk()
         if self._tail and not self._body:
             return
         crc = zlib.crc32(self._body, self._crc)
@@ -216,15 +190,6 @@ class CommittedFile:
     def _end(self) -> int:
         """Where the next bytes of the body go."""
         return self._body_start + len(self._body)
-
-    def _close_chunk(self) -> None:
-        if not self._chunk.has_messages:
-            return
-        chunk = self._chunk.close(self._end)
-        self._body += chunk.data
-        self._chunk_indexes += chunk.index
-        self._contents = self._contents.with_chunk(chunk)
-        self._chunk = OpenChunk(self._described)
 
     def _summary(self, crc: int) -> bytes:
         """The end of the file: summary and footer, with the CRC of the body before."""

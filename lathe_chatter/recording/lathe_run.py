@@ -99,14 +99,14 @@ class LatheRun:
         self._write(topic, message_bytes(kind, **fields))
 
     def commit(self) -> None:
-        """Put everything written so far on disk.
+        """Have everything written so far put on disk.
 
         Raises:
-            LatheChatterError: If the disk has too little room left.
-            OSError: If it refuses.
+            LatheChatterError: If the disk had too little room left for a commit before.
+            OSError: If it refused.
         """
         self._committed = time.monotonic()
-        self.writer.commit()
+        self.writer.commit_soon()
 
     def close(self) -> None:
         """Finish the run.

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import lz4.frame
+import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex, McapRecord
@@ -94,8 +95,9 @@ class OpenChunk:
 
     def close(self, offset: int) -> ClosedChunk:
         """The chunk as it stands at an offset of its file. It holds at least one message."""
-        first = min(min(index[::2]) for index in self._indexes.values())
-        last = max(max(index[::2]) for index in self._indexes.values())
+        times = [np.frombuffer(index, np.uint64)[::2] for index in self._indexes.values()]
+        first = int(min(each.min() for each in times))
+        last = int(max(each.max() for each in times))
         compressed = lz4.frame.compress(self._records)
         chunk = record_bytes(
             Chunk(

@@ -19,10 +19,10 @@ from lathe_chatter.recording.metadata import FILE_NAME
 from lathe_chatter.recording.numbering import Numbering
 from lathe_chatter.recording.reader import Run, read_run
 from lathe_chatter.recording.recorded_file import Note, RecordedFile, offers_of
+from lathe_chatter.recording.run_files import CLOSED
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
 from lathe_chatter.recording.sample_series import Seams
 from lathe_chatter.recording.summary import body_is_sound, read_summary
-from lathe_chatter.recording.writer import CLOSED
 
 
 class Finding(NamedTuple):
