@@ -37,7 +37,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray
 
 from lathe_chatter.changes import parse_change
-from lathe_chatter.nodes.continuity import Continuity
+from lathe_chatter.continuity import Continuity
 from lathe_chatter.nodes.messages import samples_from_message
 from lathe_chatter.nodes.running import make_executor
 

@@ -64,7 +64,8 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Play the scenario; 0 if the monitor said what the scenario expects, else 1."""
-    scenario = load_scenario(find_scenario(options.scenario))
+    file = find_scenario(options.scenario)
+    scenario = load_scenario(file)
     output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
     if output.exists():
         raise RunFailedError(f'{output} exists already: give another --output.')
@@ -72,7 +73,7 @@ def run(options: Namespace) -> int:
     console.print(f'[bold]{scenario.title}[/bold]  (scenario {scenario.name})')
     with console.status('Compiling the integrator (once on a machine) ...'):
         warm_up()
-    interrupted = _play(scenario, output, console)
+    interrupted = _play(scenario, file, output, console)
     if interrupted and not _has_samples(output):
         console.print('Interrupted before anything was recorded.')
         return INTERRUPTED
@@ -96,7 +97,7 @@ def _has_samples(output: Path) -> bool:
         return False
 
 
-def _play(scenario: Scenario, output: Path, console: Console) -> bool:
+def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool:
     """Start the cell, play, and end the cell; whether it was interrupted."""
     try:
         import rclpy
@@ -125,7 +126,9 @@ def _play(scenario: Scenario, output: Path, console: Console) -> bool:
                     cell.start(
                         'run_recorder',
                         'lathe_chatter.nodes.recorder_node',
-                        parameter_arguments({'output': str(output)}),
+                        parameter_arguments(
+                            {'output': str(output), 'attachments': [str(file.resolve())]}
+                        ),
                     )
                     cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
                     _await_nodes(operator, executor, cell)

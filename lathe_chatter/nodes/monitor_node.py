@@ -13,11 +13,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
+from lathe_chatter.continuity import Continuity, Joint
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.errors import LatheChatterError, LayoutError
 from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.model import Array
-from lathe_chatter.nodes.continuity import Continuity, Joint
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.messages import samples_from_message
 from lathe_chatter.nodes.parameter_node import ParameterNode

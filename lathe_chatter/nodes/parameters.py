@@ -116,6 +116,7 @@ RECORDER = ParameterTable(
     (
         Row('output', '', 'folder of the run to make; empty: runs/<date-time>'),
         Row('topics', RECORDED_TOPICS, 'topics to record, whenever they appear'),
+        Row('attachments', [], 'files to keep in the run as they are, its scenario for instance'),
         Row('autostart', default=True, meaning='whether to record from the start'),
         Row(
             'split_duration',

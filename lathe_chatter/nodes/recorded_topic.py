@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -18,16 +19,30 @@ from lathe_chatter.recording.numbering import Numbering
 
 _BACKLOG = 5000
 """Messages that may wait here: 10 s of a lathe of 500 ticks a second."""
-_AT_ONCE = 500
-"""Messages that are taken before other topics and timers have their turn."""
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 Write = Callable[[str, bytes, int, int, int], None]
 """Takes topic, message, log time and publish time in ns, and the publisher's number."""
 
 
+class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type information
+    """Keeps subscriptions out of what the executor waits for."""
+
+    def can_execute(self, _entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, _entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, _entity: Any) -> None:
+        return
+
+
 class RecordedTopic:
     """Hands every message on as it came, and follows what is lost on the way.
+
+    Messages wait in the middleware until `drain` takes them all: to be woken for each would
+    cost ten times as much as to take it.
 
     Args:
         node: Which subscribes.
@@ -51,6 +66,7 @@ class RecordedTopic:
         self._node = node
         self._write = write
         self._class = _message_class(topic.type)
+        self._group = _NeverReady()
         self._subscribe(_matching(offers))
 
     @property
@@ -58,45 +74,43 @@ class RecordedTopic:
         """Messages that are missing: also before the first, where publishers keep them."""
         return self.numbering.lost + (self.numbering.before if self._kept else 0)
 
+    def reception(self) -> dict[str, int]:
+        """What came, what is known to be lost, and how many were before the first."""
+        numbering = self.numbering
+        return {'messages': self.messages, 'lost': numbering.lost, 'before': numbering.before}
+
     def look(self, offers: list[TopicEndpointInfo]) -> None:
         """Follow the graph: new publishers may offer less than those before."""
         self.numbering.settle(len(offers), time.monotonic())
         wanted = _matching(offers) if offers else self._qos
         if _asks_less(wanted, self._qos):
-            self._drain()
+            self.drain()
             self._node.destroy_subscription(self._subscription)
             self._subscribe(wanted)
 
     def end(self) -> None:
         """Take what has arrived and was not yet served, and unsubscribe."""
-        self._drain()
+        self.drain()
         self.numbering.settle(self._node.count_publishers(self.topic.name), math.inf)
         self._node.destroy_subscription(self._subscription)
 
     def _subscribe(self, qos: QoSProfile) -> None:
         self._qos = qos
         self._subscription = self._node.create_subscription(
-            self._class, self.topic.name, self._on_message, qos, raw=True
+            self._class,
+            self.topic.name,
+            _unused,
+            qos,
+            callback_group=self._group,
+            raw=True,
         )
 
-    def _on_message(self, data: bytes, info: Mapping[str, Any]) -> None:
-        """Take this message, and at once those that wait behind it.
-
-        Each wake-up of the executor costs ten times as much as a message.
-        """
-        self._take(data, info)
-        self._drain(_AT_ONCE)
-
-    def _drain(self, limit: float = math.inf) -> None:
+    def drain(self) -> None:
+        """Take everything that has arrived."""
         handle = self._subscription.handle
-        taken = 0
         with handle:
-            while taken < limit:
-                found = handle.take_message(self._class, True)  # noqa: FBT003 -- raw
-                if found is None:
-                    return
+            while (found := handle.take_message(self._class, True)) is not None:  # noqa: FBT003 -- raw
                 self._take(*found)
-                taken += 1
 
     def _take(self, data: bytes, info: Mapping[str, Any]) -> None:
         number = info['publication_sequence_number'] or 0  # None where the middleware has none
@@ -106,6 +120,10 @@ class RecordedTopic:
         now = time.time_ns()
         log_time = info['received_timestamp'] or now
         self._write(self.topic.name, data, log_time, info['source_timestamp'] or now, number)
+
+
+def _unused(_data: bytes) -> None:
+    """Stands where rclpy wants a callback: messages are taken by `drain`."""
 
 
 def topic_of(name: str, offers: list[TopicEndpointInfo], types: Any) -> Topic | None:

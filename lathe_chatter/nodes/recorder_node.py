@@ -15,19 +15,26 @@ from rosbags.typesys import Stores, get_typestore
 from std_srvs.srv import Trigger
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_snapshots import ParameterSnapshots
 from lathe_chatter.nodes.parameters import RECORDER
 from lathe_chatter.nodes.recorded_topic import RecordedTopic, topic_of
+from lathe_chatter.nodes.recording_status import recording_status
 from lathe_chatter.nodes.running import run_node
 from lathe_chatter.recording import RunWriter
+from lathe_chatter.recording.closing import SUMMARY, closing_summary
 from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, RECEPTION, identity
+from lathe_chatter.recording.journal import Journal
+from lathe_chatter.recording.stalls import Stalls
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""
+_DRAIN_PERIOD = 0.02
+"""s between two times that what has arrived is taken."""
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
+_MEDIA_TYPES = {'.yaml': 'application/yaml', '.json': 'application/json', '.txt': 'text/plain'}
 _FAILED = 1
 
 
@@ -57,11 +64,13 @@ class RecorderNode(ParameterNode):
         self._topics: dict[str, RecordedTopic] = {}
         self._refused: set[str] = set()
         self._failure = ''
+        self._journal, self._stalls = Journal(), Stalls()
         self._diagnostics = Diagnostics(self, 'run recorder')
         self.create_service(Trigger, '~/start', self._on_start)
         self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_service(Trigger, '~/split', self._on_split)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_DRAIN_PERIOD, self._drain, clock=steady)
         self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
         self.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
@@ -108,13 +117,27 @@ class RecorderNode(ParameterNode):
         self._failure = ''
         self._topics.clear()
         self._refused.clear()
-        self._noted: set[str] = set()
+        self._journal, self._stalls = Journal(), Stalls()
+        self._noted: dict[str, dict[str, Any]] = {}
         self._snapshots = ParameterSnapshots(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
         self._writer.note(IDENTITY, {**identity(), 'middleware': middleware})
+        for name in values['attachments']:
+            self._attach(Path(name))
         self.get_logger().info(f'Recording into {folder}.')
         self._look()
         return folder
+
+    def _attach(self, file: Path) -> None:
+        """Put a file into the run as it is."""
+        try:
+            data = file.read_bytes()
+        except OSError as error:
+            self.get_logger().warning(f'{file} is not attached to the run: {error}.')
+            return
+        if self._writer is not None:
+            kind = _MEDIA_TYPES.get(file.suffix, 'application/octet-stream')
+            self._writer.attach(file.name, kind, data)
 
     def stop(self) -> str:
         """Finish the run, with everything that has arrived; a sentence about it."""
@@ -123,12 +146,11 @@ class RecorderNode(ParameterNode):
         for topic in self._topics.values():
             topic.end()
         writer, self._writer = self._writer, None
-        heard = {
-            name: json.dumps({'messages': topic.messages, 'lost': topic.numbering.lost})
-            for name, topic in self._topics.items()
-        }
+        heard = {name: json.dumps(topic.reception()) for name, topic in self._topics.items()}
+        stalls = {'stalls': str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
         try:
-            writer.note(RECEPTION, heard)
+            writer.note(RECEPTION, {**heard, **stalls})
+            writer.note(SUMMARY, closing_summary(self._journal, self._noted))
             writer.close()
         except OSError as error:
             self._failure = f'The end of {writer.folder} is not on disk: {error}.'
@@ -176,6 +198,14 @@ class RecorderNode(ParameterNode):
             # The namespace is / or ends without one.
             self._snapshots.want(f'{offer.node_namespace.rstrip("/")}/{offer.node_name}')
 
+    def _drain(self) -> None:
+        """Take what has arrived."""
+        if self._writer is None:
+            return
+        self._stalls.note(time.monotonic())
+        for topic in self._topics.values():
+            topic.drain()
+
     def _write(
         self, name: str, data: bytes, log_time: int, publish_time: int, number: int
     ) -> None:
@@ -184,13 +214,15 @@ class RecorderNode(ParameterNode):
             self._writer.write(
                 name, data, log_time=log_time, publish_time=publish_time, sequence=number
             )
+            kind = self._topics[name].topic.type
+            self._journal.hear(name, kind, data, log_time, publish_time)
 
     def _note_parameters(self, node: str, parameters: dict[str, Any]) -> None:
         """Keep what another node was asked for, and when it answered."""
         if self._writer is not None:
             values = {'parameters': json.dumps(parameters), 'log_time': str(time.time_ns())}
             self._writer.note(PARAMETERS + node, values)
-            self._noted.add(node)
+            self._noted[node] = parameters
 
     # -- what is done with it --------------------------------------------------------------
 
@@ -203,6 +235,7 @@ class RecorderNode(ParameterNode):
         """
         if self._writer is None:
             return
+        self._drain()
         try:
             self._writer.commit_soon()
         except (OSError, LatheChatterError) as error:
@@ -248,19 +281,7 @@ class RecorderNode(ParameterNode):
         self._diagnostics.publish([self._status()])
 
     def _status(self) -> Status:
-        lost = {name: self.lost_of(name) for name in self._topics if self.lost_of(name)}
-        values = {
-            'run': str(self.run or ''),
-            'messages': str(sum(map(self.messages_of, self._topics))),
-            'lost': str(sum(lost.values())),
-            'topics': str(len(self._topics)),
-        }
-        if self._failure:
-            return Status('recording', ERROR, self._failure, values)
-        if lost:
-            named = ', '.join(f'{count} of {name}' for name, count in lost.items())
-            return Status('recording', WARN, f'messages were lost: {named}', values)
-        return Status('recording', OK, 'recording' if self._writer else 'not recording', values)
+        return recording_status(self.run, self._failure, self._topics, self._journal, self._stalls)
 
 
 def main() -> None:
@@ -270,7 +291,7 @@ def main() -> None:
         SystemExit: With 1 if the disk took no more.
     """
     try:
-        # The executor driven by events fails on callbacks that take the message info too.
+        # The executor driven by events would call for each message.
         run_node(RecorderNode, by_events=False)
     except RecordingFailedError as error:
         sys.stderr.write(f'{error}\n')

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from lathe_chatter.model import Array
+from lathe_chatter.recording.closing import SUMMARY, closing_summary
 from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity
+from lathe_chatter.recording.journal import Journal
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
     PARAMETER_EVENT_TYPE,
@@ -63,7 +65,10 @@ class LatheRun:
         self._simulated = simulated
         self._sequences: dict[str, int] = {}
         self._committed = time.monotonic()
+        self._closed = False
         values = {'parameters': json.dumps(dict(parameters)), 'log_time': str(self._begun)}
+        self._journal, self._parameters = Journal(), dict(parameters)
+        self._kinds: dict[str, str] = {}
         self.writer.note(IDENTITY, identity())
         self.writer.note(PARAMETERS + name, values)
         for topic, kind in (
@@ -71,7 +76,7 @@ class LatheRun:
             ('/rosout', LOG_TYPE),
             ('/parameter_events', PARAMETER_EVENT_TYPE),
         ):
-            self.writer.add_topic(topic_of_type(topic, kind))
+            self._announce(topic, kind)
         announced = parameters_bytes(name, dict(parameters), self._begun)
         self._write('/parameter_events', announced)
 
@@ -95,7 +100,8 @@ class LatheRun:
 
     def publish(self, topic: str, kind: str, **fields: Any) -> None:
         """Write a message of another topic, as `std_msgs/msg/Bool` with `data=True`."""
-        self.writer.add_topic(topic_of_type(topic, kind))
+        if topic not in self._kinds:
+            self._announce(topic, kind)
         self._write(topic, message_bytes(kind, **fields))
 
     def commit(self) -> None:
@@ -109,15 +115,21 @@ class LatheRun:
         self.writer.commit_soon()
 
     def close(self) -> None:
-        """Finish the run.
+        """Finish the run, with its summary; a second time does nothing.
 
         Raises:
             OSError: If the disk refuses.
         """
+        if self._closed:
+            return
+        self._closed = True
+        told = closing_summary(self._journal, {self.name: self._parameters})
+        self.writer.note(SUMMARY, told)
         self.writer.close()
 
     def abandon(self) -> None:
         """Leave what the last commit left: the disk takes no more."""
+        self._closed = True
         self.writer.abandon()
 
     def __enter__(self) -> LatheRun:  # noqa: PYI034 -- Self needs Python 3.11
@@ -128,6 +140,10 @@ class LatheRun:
         """Close, also after an exception."""
         self.close()
 
+    def _announce(self, topic: str, kind: str) -> None:
+        self.writer.add_topic(topic_of_type(topic, kind))
+        self._kinds[topic] = kind
+
     def _stamp(self) -> int:
         return self._now if self._simulated else time.time_ns()
 
@@ -135,3 +151,4 @@ class LatheRun:
         number = self._sequences[topic] = self._sequences.get(topic, 0) + 1
         stamp = self._stamp()
         self.writer.write(topic, data, log_time=stamp, publish_time=stamp, sequence=number)
+        self._journal.hear(topic, self._kinds[topic], data, stamp, stamp)

@@ -100,6 +100,10 @@ class Run:
         """What was noted beside the messages, in every file, in order."""
         return [note for file in self._opened() for note in file.notes()]
 
+    def attachments(self) -> list[Any]:
+        """Files that were kept in the run, as mcap has them: name, media_type, data."""
+        return [each for file in self._opened() for each in file.attachments()]
+
     def raw_messages(self, *topics: str) -> Iterator[Raw]:
         """The messages of some topics, or of all if none is named, as they are in the file.
 

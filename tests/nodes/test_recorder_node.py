@@ -12,15 +12,19 @@ from typing import Any
 
 import pytest
 from bench import Bench
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
 from lathe_chatter import __version__
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.recorder_node import RecorderNode
 from lathe_chatter.recording import read_run, verify
+from lathe_chatter.recording.closing import SUMMARY
 
 Start = Callable[..., Any]
 KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -122,6 +126,33 @@ def test_an_existing_folder_at_the_start_of_the_process_is_one_sentence(tmp_path
     assert done.stderr.strip() == f'{tmp_path} exists already, and no recorded run is overwritten.'
 
 
+def test_a_gap_in_the_samples_is_told_by_their_own_times(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['lathe/samples'])
+    told = bench.listen(DiagnosticArray, '/diagnostics')
+    publisher = bench.node.create_publisher(Float64MultiArray, '/lathe/samples', KEPT)
+    lathe = VirtualLathe()
+    lathe.advance(40)
+    for k in range(20):
+        samples = lathe.advance(20)
+        if k not in (7, 8):  # no publisher's number tells of these
+            publisher.publish(samples_to_message(samples))
+    spin_until(lambda: recorder.messages_of('/lathe/samples') == 18, 'the blocks')
+    spin_until(
+        lambda: any(
+            '40 samples of /lathe/samples are missing' in status.message
+            for array in told
+            for status in array.status
+        ),
+        'the diagnostic',
+    )
+    recorder.stop()
+    (notes,) = [n for n in read_run(tmp_path / 'run').notes() if n.name == SUMMARY]
+    counted = json.loads(notes.values['samples'])['/lathe/samples']
+    assert (counted['head'], counted['lost'], counted['gaps']) == (40, 40, 1)
+
+
 def test_publishers_that_share_a_topic_lose_nothing(
     start: Start, bench: Bench, spin_until: Any, tmp_path: Path
 ) -> None:
@@ -143,10 +174,25 @@ def test_the_run_knows_who_made_it_and_the_parameters_of_the_lathe(
     start: Start, spin_until: Any, tmp_path: Path
 ) -> None:
     start(LatheNode, depth_of_cut=0.0007, seed=5)
-    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['lathe/samples'])
+    (tmp_path / 'deep.yaml').write_text('title: deep\n')
+    recorder = start(
+        RecorderNode,
+        output=str(tmp_path / 'run'),
+        topics=['lathe/samples'],
+        attachments=[str(tmp_path / 'deep.yaml'), str(tmp_path / 'missing')],
+    )
     spin_until(lambda: recorder.parameters_noted('/lathe'), 'the parameters')
     recorder.stop()
-    notes = {note.name: note.values for note in read_run(tmp_path / 'run').notes()}
+    run = read_run(tmp_path / 'run')
+    (attached,) = run.attachments()
+    assert (attached.name, attached.data) == ('deep.yaml', b'title: deep\n')
+    notes = {note.name: note.values for note in run.notes()}
+    summary = notes['lathe_chatter/summary']
+    samples = json.loads(summary['samples'])['/lathe/samples']
+    assert samples['samples'] == 20 * recorder.messages_of('/lathe/samples')
+    (verdict,) = json.loads(summary['linear_model'])['/lathe/samples']
+    assert verdict['depth_of_cut'] == 0.0007
+    assert json.loads(notes['lathe_chatter/reception']['/lathe/samples'])['lost'] == 0
     assert notes['lathe_chatter/made_by']['lathe_chatter'] == __version__
     parameters = json.loads(notes['lathe_chatter/parameters/lathe']['parameters'])
     assert (parameters['depth_of_cut'], parameters['seed']) == (0.0007, 5)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lathe_chatter.continuity import Continuity, Joint
 from lathe_chatter.model import Array
-from lathe_chatter.nodes.continuity import Continuity, Joint
 
 RATE = 1e4
 

@@ -1,0 +1,61 @@
+"""What /diagnostics shows of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
+from lathe_chatter.nodes.recorded_topic import RecordedTopic
+from lathe_chatter.recording.journal import Journal
+from lathe_chatter.recording.stalls import Stalls
+
+
+def recording_status(
+    run: Path | None,
+    failure: str,
+    topics: Mapping[str, RecordedTopic],
+    journal: Journal,
+    stalls: Stalls,
+) -> Status:
+    """The status of a recorder.
+
+    Args:
+        run: Its folder; None while nothing is recorded.
+        failure: Why a recording ended that should not have; empty where none did.
+        topics: By name.
+        journal: Of the run.
+        stalls: Of the recorder.
+    """
+    values = {
+        'run': str(run or ''),
+        'messages': str(sum(topic.messages for topic in topics.values())),
+        'lost': str(sum(topic.lost for topic in topics.values())),
+        'topics': str(len(topics)),
+        'stalls': str(stalls.count),
+        'longest stall, s': f'{stalls.longest:.3g}',
+    }
+    for name, heard in journal.samples.items():
+        values |= {
+            f'{name}: samples': str(heard.continuity.samples),
+            f'{name}: samples before the first': str(heard.head),
+            f'{name}: samples lost': str(heard.continuity.lost),
+            f'{name}: silences': str(heard.silences),
+        }
+    if failure:
+        return Status('recording', ERROR, failure, values)
+    complaints = '; '.join(_complaints(topics, journal))
+    if complaints:
+        return Status('recording', WARN, complaints, values)
+    return Status('recording', OK, 'recording' if run else 'not recording', values)
+
+
+def _complaints(topics: Mapping[str, RecordedTopic], journal: Journal) -> Iterator[str]:
+    lost = [f'{topic.lost} of {name}' for name, topic in topics.items() if topic.lost]
+    if lost:
+        yield f'messages were lost: {", ".join(lost)}'
+    for name, heard in journal.samples.items():
+        if heard.continuity.lost:
+            yield f'{heard.continuity.lost} samples of {name} are missing'
+        if heard.complaint:
+            yield f'{name}: {heard.complaint}'
