@@ -39,6 +39,7 @@ CONTRACT = {
     'sample_rate': (1e4, 'Hz', False),
     'seed': (0, '', False),
     'publish_clock': (False, '', False),
+    'await_readers': (0, '', False),
     'record': ('', '', False),
 }
 
