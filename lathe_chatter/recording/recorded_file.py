@@ -52,12 +52,13 @@ class RecordedFile:
 
     Attributes:
         known: Schemas and channels, as far as they have been met.
+        on_damage: As it was given.
     """
 
     def __init__(self, path: Path, on_damage: Callable[[Damage], None]) -> None:
         """Read the end of the file, where schemas and channels stand together."""
         self.path = path
-        self._on_damage = on_damage
+        self.on_damage = on_damage
         summary = read_summary(path)
         self.has_summary = summary is not None
         self.known = summary or Summary(0)
@@ -89,7 +90,7 @@ class RecordedFile:
                 if contents is not None:
                     yield contents
             elif isinstance(found, Damage):
-                self._on_damage(found)
+                self.on_damage(found)
             elif not self.has_summary and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 # No CRC covers what stands outside of chunks: only where there is nothing better.
                 with contextlib.suppress(*_UNREADABLE):
@@ -111,7 +112,7 @@ class RecordedFile:
                     yield kind.read(ReadDataStream(BytesIO(found.content)))
                 except _UNREADABLE:
                     where = found.offset, found.offset + len(found.content)
-                    self._on_damage(Damage(self.path, *where, 'a note cannot be read'))
+                    self.on_damage(Damage(self.path, *where, 'a note cannot be read'))
 
     def _opened(self, chunk: Chunk) -> Contents | None:
         try:
@@ -121,12 +122,12 @@ class RecordedFile:
                 content = chunk.records[offset + 9 : offset + 9 + length]
                 add_record(self.known, opcode, content)
         except _UNREADABLE as error:
-            self._on_damage(Damage(self.path, chunk.offset, chunk.offset, str(error)))
+            self.on_damage(Damage(self.path, chunk.offset, chunk.offset, str(error)))
             return None
         unknown = set(np.unique(messages.heads['channel']).tolist()) - set(self.known.channels)
         if unknown:
             reason = f'its messages of channel {min(unknown)} are of a topic that nothing names'
-            self._on_damage(Damage(self.path, chunk.offset, chunk.offset, reason))
+            self.on_damage(Damage(self.path, chunk.offset, chunk.offset, reason))
         return Contents(chunk.first, messages)
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import Array, Integers
-from lathe_chatter.recording.sample_blocks import Blocks
+from lathe_chatter.recording.sample_cuts import Cut
 
-_TIME = 'time'
 _LARGER_THAN_STEP = 1.5
 """A step of time between two samples so many times the usual one is a gap."""
 
@@ -77,53 +75,41 @@ class Seams:
                 self.lost += round(float(steps[place]) / self.step) - 1
 
 
-def joined(
-    blocks: Iterator[Blocks],
-    expected: int,
-    wanted: tuple[str, ...] | None,
-    start: float,
-    end: float,
-) -> Samples | None:
-    """All samples of blocks within a range of simulated time.
+def joined(cuts: Iterator[Cut], expected: int, start: float, end: float) -> Samples | None:
+    """All samples within a range of simulated time.
 
     Args:
-        blocks: In order.
+        cuts: In order.
         expected: How many blocks there are, as far as is known.
-        wanted: Names of columns; None for all.
         start: Of the range, s.
         end: Of the range, s.
 
     Returns:
-        The samples; those of the names that exist. None where there is not one sample.
-
-    Raises:
-        LayoutError: If the samples have no time.
+        The samples. None where there is not one.
     """
     signals: _Signals | None = None
     log_times: list[Integers] = []
     ends: list[Array] = []
     seams = Seams()
-    for each in blocks:
-        if not each.samples.size:
+    for cut in cuts:
+        if not len(cut.times):
             continue
         if signals is None:
-            names = [n for n in each.columns if wanted is None or n in wanted]
-            signals = _Signals(names, expected * int(each.rows[0]))
-        time = _times(each)
-        last = time[np.cumsum(each.rows) - 1]
-        part = each.samples
+            signals = _Signals(cut.columns, expected * int(cut.rows[0]))
+        time, part = cut.times, cut.signals
+        last = time[np.cumsum(cut.rows) - 1]
         if start > time.min() or end < time.max():
             inside = (time >= start) & (time <= end)
-            part, time = part[inside], time[inside]
-            kept = (last >= start) & (last - (each.rows - 1) * seams.step <= end)
-            log_times.append(each.log_times[kept])
+            part, time = part[:, inside], time[inside]
+            kept = (last >= start) & (last - (cut.rows - 1) * seams.step <= end)
+            log_times.append(cut.log_times[kept])
             ends.append(last[kept])
         else:
-            log_times.append(each.log_times)
+            log_times.append(cut.log_times.copy())
             ends.append(last)
         if len(time):
             seams.follow(time)
-            signals.append(part, each.columns)
+            signals.append(cut.columns, part)
     if signals is None:
         return None
     return Samples(
@@ -135,29 +121,22 @@ def joined(
     )
 
 
-def _times(blocks: Blocks) -> Array:
-    if _TIME not in blocks.columns:
-        raise LayoutError(f'The samples have no column {_TIME}, only {", ".join(blocks.columns)}.')
-    times: Array = blocks.samples[:, blocks.columns.index(_TIME)]
-    return times
-
-
 class _Signals:
     """Signals that grow at their ends, each in one array, so that nothing is held twice."""
 
-    def __init__(self, names: list[str], expected: int) -> None:
+    def __init__(self, names: Sequence[str], expected: int) -> None:
         self._arrays = {name: np.empty(expected) for name in names}
         self._room = expected
         self._size = 0
 
-    def append(self, samples: Array, columns: tuple[str, ...]) -> None:
-        """Add samples (n, k) of named columns."""
-        end = self._size + len(samples)
+    def append(self, names: Sequence[str], signals: Array) -> None:
+        """Add named signals (k, n); all that were there at the beginning."""
+        end = self._size + signals.shape[1]
         if end > self._room:
             self._room = max(end, self._room * 3 // 2)
             self._arrays = {n: np.resize(a, self._room) for n, a in self._arrays.items()}
         for name, array in self._arrays.items():
-            array[self._size : end] = samples[:, columns.index(name)]
+            array[self._size : end] = signals[names.index(name)]
         self._size = end
 
     def taken(self) -> dict[str, Array]:

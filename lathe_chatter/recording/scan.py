@@ -19,14 +19,21 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
+from lathe_chatter.recording.summary import ChunkPlace
+
 _HEAD = struct.Struct('<BQ')
 _CHUNK = struct.Struct('<QQQII')
 """First and last log time, size and CRC of the records, length of the compression's name."""
+_FIELDS_ROOM = _CHUNK.size + 64
+"""Bytes that surely hold these and the name."""
 _INDEX = struct.Struct('<HI')
 _SIZES = {Opcode.DATA_END: 4, Opcode.FOOTER: 20}
 _SIGNS = (b'\x03\x00\x00\x00lz4', b'\x04\x00\x00\x00zstd')
 """What a compressed chunk has after its other fields, which makes it easy to find."""
 _BEFORE_SIGN = _HEAD.size + _CHUNK.size - 4
+
+_Fields = tuple[int, int, int, int, str, int]
+"""First and last log time, size, CRC and compression of a chunk, and where its data begin."""
 
 Wanted = Callable[[int, int], bool]
 """Whether a chunk is wanted, by its first and last log time in ns."""
@@ -99,6 +106,35 @@ def scan(file: Path, wanted: Wanted | None = None) -> Iterator[Chunk | Plain | D
         os.close(descriptor)
 
 
+def read_chunk(file: Path, descriptor: int, place: ChunkPlace) -> Chunk | Damage:
+    """A chunk that an index names, or what is wrong with it; its message indexes are left out.
+
+    Args:
+        file: Its name.
+        descriptor: Open for reading.
+        place: Where it is.
+    """
+    try:
+        return _chunk_at(descriptor, place)
+    except _BadChunkError as error:
+        return Damage(file, place.offset, place.offset + place.length, str(error))
+
+
+def _chunk_at(descriptor: int, place: ChunkPlace) -> Chunk:
+    data = os.pread(descriptor, place.length, place.offset)
+    if len(data) < place.length or len(data) < _HEAD.size + _CHUNK.size:
+        raise _BadChunkError('a chunk of the index is cut off')
+    opcode, length = _HEAD.unpack_from(data)
+    if (opcode, length) != (Opcode.CHUNK, place.length - _HEAD.size):
+        raise _BadChunkError('a chunk of the index is not there')
+    fields = _fields(data[_HEAD.size : _HEAD.size + _FIELDS_ROOM], length)
+    if fields is None:
+        raise _BadChunkError('the head of a chunk is damaged')
+    first, last, size, crc, name, begin = fields
+    records = _decompressed(memoryview(data)[_HEAD.size + begin :], name, size, crc)
+    return Chunk(place.offset, first, last, records, {})
+
+
 class _Walk:
     def __init__(self, file: Path, descriptor: int, wanted: Wanted | None) -> None:
         self._file = file
@@ -159,7 +195,7 @@ class _Walk:
             return None
         if length != _SIZES.get(opcode, length):
             return None
-        if opcode == Opcode.CHUNK and self._parts(position, length) is None:
+        if opcode == Opcode.CHUNK and self._chunk_fields(position, length) is None:
             return None
         if opcode == Opcode.MESSAGE_INDEX:
             fields = self._read(position + _HEAD.size, _INDEX.size)
@@ -167,20 +203,8 @@ class _Walk:
                 return None
         return opcode, length
 
-    def _parts(self, position: int, length: int) -> tuple[int, int, int, int, str, int] | None:
-        """The fields of a chunk before its data, and where that begins; None if they disagree."""
-        head = self._read(position + _HEAD.size, _CHUNK.size + 64)
-        if len(head) < _CHUNK.size:
-            return None
-        first, last, size, crc, letters = _CHUNK.unpack_from(head)
-        data = _CHUNK.size + letters + 8
-        if letters > 16 or data > len(head):  # no name is so long
-            return None
-        (stored,) = struct.unpack_from('<Q', head, data - 8)
-        if data + stored != length:
-            return None
-        name = head[_CHUNK.size : _CHUNK.size + letters].decode('ascii', 'replace')
-        return first, last, size, crc, name, position + _HEAD.size + data
+    def _chunk_fields(self, position: int, length: int) -> _Fields | None:
+        return _fields(self._read(position + _HEAD.size, _FIELDS_ROOM), length)
 
     def _chunk(self, position: int, length: int) -> tuple[Chunk | None, int]:
         """The chunk at a place with its indexes, None if it is not wanted, and where they end.
@@ -189,15 +213,14 @@ class _Walk:
             _BadChunkError: If its data are not what was written.
         """
         end = position + _HEAD.size + length
-        parts = self._parts(position, length)
-        if parts is None:
+        fields = self._chunk_fields(position, length)
+        if fields is None:
             raise _BadChunkError('the head of a chunk is damaged')
-        first, last, size, crc, name, data = parts
+        first, last, size, crc, name, begin = fields
+        data = position + _HEAD.size + begin
         if self._wanted is not None and not self._wanted(first, last):
             return None, end
-        records = _decompressed(self._read(data, end - data), name, size)
-        if crc and zlib.crc32(records) != crc:
-            raise _BadChunkError('a chunk does not have its CRC')
+        records = _decompressed(self._read(data, end - data), name, size, crc)
         indexes: dict[int, bytes] = {}
         while (found := self._head(end)) is not None and found[0] == Opcode.MESSAGE_INDEX:
             content = self._read(end + _HEAD.size, found[1])
@@ -226,11 +249,31 @@ class _Walk:
         return found is not None and found[0] == Opcode.CHUNK
 
 
-def _decompressed(data: bytes, name: str, size: int) -> bytes:
+def _fields(head: bytes, length: int) -> _Fields | None:
+    """The fields of a chunk before its data, and where that begins; None if they disagree.
+
+    Args:
+        head: Of its content, with all of the fields if they are what they should be.
+        length: Of its content.
+    """
+    if len(head) < _CHUNK.size:
+        return None
+    first, last, size, crc, letters = _CHUNK.unpack_from(head)
+    begin = _CHUNK.size + letters + 8
+    if letters > 16 or begin > len(head):  # no name is so long
+        return None
+    (stored,) = struct.unpack_from('<Q', head, begin - 8)
+    if begin + stored != length:
+        return None
+    name = head[_CHUNK.size : _CHUNK.size + letters].decode('ascii', 'replace')
+    return first, last, size, crc, name, begin
+
+
+def _decompressed(data: bytes | memoryview, name: str, size: int, crc: int) -> bytes:
     """The records of a chunk.
 
     Raises:
-        _BadChunkError: If there is no such compression, or the data are not of it.
+        _BadChunkError: If there is no such compression, or the data are not what was written.
     """
     try:
         if name == 'lz4':
@@ -238,11 +281,13 @@ def _decompressed(data: bytes, name: str, size: int) -> bytes:
         elif name == 'zstd':
             records = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
         elif name == '':
-            records = data
+            records = bytes(data)
         else:
             raise _BadChunkError(f'a chunk is compressed as {name!r}, which is not known')
     except (RuntimeError, zstandard.ZstdError, MemoryError):
         raise _BadChunkError('a chunk cannot be decompressed') from None
     if len(records) != size:
         raise _BadChunkError('a chunk has not its size')
+    if crc and zlib.crc32(records) != crc:
+        raise _BadChunkError('a chunk does not have its CRC')
     return records

@@ -8,7 +8,7 @@ import zlib
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -19,6 +19,16 @@ _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
 _AT_ONCE = 1 << 22
 _HEAD = struct.Struct('<BQ')
+_CHUNK_INDEX = struct.Struct('<16xQQ')
+_WANTED = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
+
+
+class ChunkPlace(NamedTuple):
+    """Where a chunk is in its file, and the size of its records before compression, bytes."""
+
+    offset: int
+    length: int
+    size: int
 
 
 @dataclass
@@ -30,12 +40,14 @@ class Summary:
         schemas: By number.
         channels: By number.
         statistics: None where the writer made none.
+        chunks: In order, as far as its writer indexed them.
     """
 
     start: int
     schemas: dict[int, Any] = field(default_factory=dict)
     channels: dict[int, Any] = field(default_factory=dict)
     statistics: Any = None
+    chunks: list[ChunkPlace] = field(default_factory=list)
 
 
 def read_summary(file: Path) -> Summary | None:
@@ -92,7 +104,12 @@ def _parsed(data: bytes, start: int) -> Summary:
     while place < len(data):
         opcode, length = _HEAD.unpack_from(data, place)
         place += _HEAD.size
-        add_record(summary, opcode, data[place : place + length])
+        if opcode == Opcode.CHUNK_INDEX:
+            offset, size = _CHUNK_INDEX.unpack_from(data, place)
+            (uncompressed,) = struct.unpack_from('<Q', data, place + length - 8)
+            summary.chunks.append(ChunkPlace(offset, size, uncompressed))
+        elif opcode in _WANTED:
+            add_record(summary, opcode, data[place : place + length])
         place += length
     return summary
 
