@@ -26,6 +26,8 @@ setup(
         'lz4',  # the compression of the chunks of a run
         'zstandard',  # that of runs written by others
     ],
+    # A run in other hands; each is asked for only where it is used.
+    extras_require={'export': ['pyarrow', 'pandas', 'xarray']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.recording.chunk_messages import Messages, joined_messages
+from lathe_chatter.recording.frames import to_pandas, to_xarray
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
 from lathe_chatter.recording.sample_cuts import Cut, cut_of, cuts_by_index
@@ -147,7 +148,7 @@ class Run:
             RunReadError: If a file is damaged, or there are several lathes and no topic is named.
             LayoutError: If a message is no block of samples.
         """
-        name = topic or self._only_samples()
+        name = topic or self.samples_topic()
         for file in self._opened():
             yield from _blocks(file, name)
 
@@ -172,7 +173,7 @@ class Run:
                 lathes and no topic is named.
             LayoutError: If a message is no block of samples.
         """
-        name = topic or self._only_samples()
+        name = topic or self.samples_topic()
         wanted = None if columns is None else tuple(columns)
         expected = sum(file.count(name) for file in self._opened())
         found = joined(self._cuts(name, wanted), expected, start, end)
@@ -182,6 +183,54 @@ class Run:
             missing = ', '.join(sorted(set(wanted) - set(found.columns)))
             raise RunReadError(f'The samples of {name} in {self.path} have no column {missing}.')
         return found
+
+    def count_of_samples(self, topic: str | None = None) -> int | None:
+        """About how many samples a lathe has here; None where the files do not say."""
+        name = topic or self.samples_topic()
+        blocks = sum(file.count(name) for file in self._opened())
+        first = next(iter(self.sample_blocks(name)), None) if blocks else None
+        return None if first is None else blocks * int(first.rows[0])
+
+    def to_pandas(self, **chosen: Any) -> Any:
+        """The samples as a pandas DataFrame by simulated time; see `frames.to_pandas`.
+
+        Args:
+            chosen: Topic, columns, start and end, as for `samples`.
+
+        Raises:
+            MissingPackageError: If pandas is not installed.
+            RunReadError: As `samples`.
+        """
+        return to_pandas(self, **chosen)
+
+    def to_xarray(self, **chosen: Any) -> Any:
+        """The samples as an xarray Dataset over simulated time; see `frames.to_xarray`.
+
+        Args:
+            chosen: Topic, columns, start and end, as for `samples`.
+
+        Raises:
+            MissingPackageError: If xarray is not installed.
+            RunReadError: As `samples`.
+        """
+        return to_xarray(self, **chosen)
+
+    def samples_topic(self) -> str:
+        """The topic of the samples, where the run has one lathe.
+
+        Raises:
+            RunReadError: If it has none, or several.
+        """
+        names = sorted(
+            name
+            for name, kind in self.topics.items()
+            if name.endswith('/samples') and kind == SAMPLES_TYPE
+        )
+        if not names:
+            raise RunReadError(f'{self.path} holds no samples of a lathe.')
+        if len(names) > 1:
+            raise RunReadError(f'{self.path} holds several lathes, {", ".join(names)}: name one.')
+        return names[0]
 
     def _cuts(self, topic: str, wanted: tuple[str, ...] | None) -> Iterator[Cut]:
         """Columns of the samples of a topic, by the quickest way that each file allows."""
@@ -210,18 +259,6 @@ class Run:
                 if schema.name == kind:
                     return str(schema.data.decode())
         raise RunReadError(f'{self.path} does not say what a {kind} is.')
-
-    def _only_samples(self) -> str:
-        names = sorted(
-            name
-            for name, kind in self.topics.items()
-            if name.endswith('/samples') and kind == SAMPLES_TYPE
-        )
-        if not names:
-            raise RunReadError(f'{self.path} holds no samples of a lathe.')
-        if len(names) > 1:
-            raise RunReadError(f'{self.path} holds several lathes, {", ".join(names)}: name one.')
-        return names[0]
 
 
 def _blocks(file: RecordedFile, topic: str) -> Iterator[Blocks]:

@@ -1,0 +1,146 @@
+"""A run in the hands of other programs: every number with its last bit, gaps told."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from recording.conftest import NUMBER, STORE
+from rosbags.rosbag2 import Reader
+
+from lathe_chatter.cli import main
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe_parameters import parameters_of
+from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.recording import LatheRun, read_run
+
+BLOCKS, ROWS, MISSING = 60, 20, 30
+
+
+@pytest.fixture(scope='module')
+def samples() -> Array:
+    blocks = VirtualLathe().advance(BLOCKS * ROWS).reshape(BLOCKS, ROWS, -1)
+    return np.concatenate(np.delete(blocks, MISSING, axis=0))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, samples: Array) -> Path:
+    """A run in which one block is missing."""
+    with LatheRun(tmp_path / 'run', parameters_of(VirtualLathe())) as run:
+        for block in samples.reshape(BLOCKS - 1, ROWS, -1):
+            run.take(block)
+    return tmp_path / 'run'
+
+
+def test_csv_is_read_back_to_the_last_bit(
+    folder: Path, samples: Array, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['export', str(folder), '--json']) == 0
+    told = capsys.readouterr()
+    figures = json.loads(told.out)
+    assert figures['samples'] == len(samples)
+    assert figures['gaps'] == [[0.06, 0.0621]]
+    assert 'samples are missing between 0.060000 s and 0.062100 s' in told.err
+    with Path(figures['path']).open() as stream:
+        names, *rows = csv.reader(stream)
+    assert tuple(names) == SAMPLE_COLUMNS
+    assert np.array(rows, float).tobytes() == samples.tobytes()
+
+
+def test_columns_and_a_range_of_time(folder: Path, samples: Array, tmp_path: Path) -> None:
+    out = tmp_path / 'part.csv'
+    words = ['--columns', 'cutting_force,chip_thickness', '--start', '0.01', '--end', '0.02']
+    assert main(['export', str(folder), '--output', str(out), *words]) == 0
+    found = np.genfromtxt(out, delimiter=',', names=True)
+    assert found.dtype.names == ('time', 'chip_thickness', 'cutting_force')
+    inside = samples[(samples[:, 0] >= 0.01) & (samples[:, 0] <= 0.02)]
+    assert found['time'].tolist() == inside[:, 0].tolist()
+    assert found['cutting_force'].tolist() == inside[:, 7].tolist()
+
+
+def test_unrolled_each_sample_is_a_message_at_its_simulated_time(
+    folder: Path, samples: Array, tmp_path: Path
+) -> None:
+    assert main(['export', str(folder), '--unrolled']) == 0
+    out = tmp_path / 'run-unrolled'
+    stamps = [round(time * 1e9) for time in samples[:, 0]]
+    with Reader(out) as reader:
+        assert {each.msgtype for each in reader.connections} == {NUMBER}
+        found = {each.topic: [] for each in reader.connections}
+        for each, stamp, data in reader.messages():
+            found[each.topic].append((stamp, STORE.deserialize_cdr(data, NUMBER).data))
+    for k, name in enumerate(SAMPLE_COLUMNS[1:], 1):
+        pairs = list(zip(stamps, samples[:, k].tolist(), strict=True))
+        assert found[f'/lathe/samples/{name}'] == pairs
+    with (out / 'run-unrolled_0.mcap').open('rb') as stream:
+        count = sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
+    assert count == 7 * len(samples)
+
+
+def test_unrolled_stamps_go_on_where_simulated_time_goes_back(tmp_path: Path) -> None:
+    with LatheRun(tmp_path / 'run', parameters_of(VirtualLathe())) as run:
+        run.take(VirtualLathe().advance(3))
+        run.take(VirtualLathe().advance(3))
+    assert main(['export', str(tmp_path / 'run'), '--unrolled', '--columns', 'cutting_force']) == 0
+    raw = read_run(tmp_path / 'run-unrolled').raw_messages()
+    assert [each.log_time for each in raw] == [k * 100_000 for k in (1, 2, 3, 4, 5, 6)]
+
+
+def test_nothing_is_overwritten(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'run.csv').write_text('mine')
+    assert main(['export', str(folder)]) == 2
+    assert 'exists already, and no file is overwritten' in capsys.readouterr().err
+    assert (tmp_path / 'run.csv').read_text() == 'mine'
+
+
+def test_a_column_that_is_not_there_is_one_sentence(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['export', str(folder), '--columns', 'speed']) == 2
+    assert 'have no column speed.' in capsys.readouterr().err
+
+
+def test_parquet_holds_every_bit_units_and_gaps(
+    folder: Path, samples: Array, tmp_path: Path
+) -> None:
+    parquet = pytest.importorskip('pyarrow.parquet')
+    assert main(['export', str(folder), '--format', 'parquet']) == 0
+    table = parquet.read_table(tmp_path / 'run.parquet')
+    assert tuple(table.column_names) == SAMPLE_COLUMNS
+    columns = [table.column(name).to_numpy() for name in SAMPLE_COLUMNS]
+    assert np.column_stack(columns).tobytes() == samples.tobytes()
+    assert table.schema.field('cutting_force').metadata == {b'unit': b'N'}
+    told = parquet.read_metadata(tmp_path / 'run.parquet').metadata
+    assert json.loads(told[b'gaps']) == [[0.06, 0.0621]]
+
+
+def test_pandas_and_xarray_have_the_same_numbers(folder: Path, samples: Array) -> None:
+    pytest.importorskip('pandas')
+    pytest.importorskip('xarray')
+    run = read_run(folder)
+    frame = run.to_pandas(columns=['chip_thickness'], start=0.01)
+    inside = samples[samples[:, 0] >= 0.01]
+    assert frame.index.to_numpy().tobytes() == np.ascontiguousarray(inside[:, 0]).tobytes()
+    assert frame['chip_thickness'].to_list() == inside[:, 6].tolist()
+    assert frame.attrs['gaps'] == [(0.06, 0.0621)]
+    data = run.to_xarray()
+    assert data['tool_velocity'].attrs == {'units': 'm/s'}
+    assert data['tool_velocity'].sel(time=0.05).item() == samples[499, 3]
+    assert data.attrs['gaps'] == [(0.06, 0.0621)]
+
+
+@pytest.mark.parametrize('name', ['pandas', 'xarray'])
+def test_without_the_library_it_is_one_sentence(name: str, folder: Path) -> None:
+    try:
+        __import__(name)
+    except ImportError:
+        with pytest.raises(Exception, match=f'needs {name}, which is not installed'):
+            getattr(read_run(folder), f'to_{name}')()
+    else:
+        pytest.skip(f'{name} is installed')
