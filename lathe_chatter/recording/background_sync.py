@@ -11,6 +11,9 @@ class BackgroundSync:
 
     Args:
         descriptor: Of the open file, which is from now on closed here.
+
+    Attributes:
+        messages: How many messages of the file no loss of power can take any more.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -18,12 +21,14 @@ class BackgroundSync:
         self._descriptor = descriptor
         self._asked = threading.Event()
         self._ended = False
+        self.messages = self._written = 0
         self._failure: OSError | None = None
         self._thread = threading.Thread(target=self._serve, name='fdatasync', daemon=True)
         self._thread.start()
 
-    def ask(self) -> None:
-        """Sync soon; requests that come meanwhile are served together."""
+    def ask(self, messages: int) -> None:
+        """Sync a file of so many messages soon; requests meanwhile are served together."""
+        self._written = messages
         self._asked.set()
 
     def check(self) -> None:
@@ -54,9 +59,12 @@ class BackgroundSync:
         while not ended:
             self._asked.wait()
             self._asked.clear()
-            ended = self._ended  # read before the sync, which then covers all that was written
+            # Read before the sync, which then covers all that was written.
+            ended, written = self._ended, self._written
             try:
                 os.fdatasync(self._descriptor)
             except OSError as error:
                 self._failure = error
+            else:
+                self.messages = written
         os.close(self._descriptor)

@@ -100,6 +100,11 @@ class CommittedFile:
         """Bytes on disk."""
         return self._body_start + len(self._tail)
 
+    @property
+    def safe_messages(self) -> int:
+        """How many messages no loss of power can take any more."""
+        return self._sync.messages
+
     def add_channel(self, schema: bytes, channel: bytes) -> None:
         """Add the record of a channel, and of its schema unless it is empty."""
         if schema:
@@ -161,7 +166,7 @@ class CommittedFile:
         self._body.clear()
         self._crc, self._tail = crc, tail
         self.committed = self._contents
-        self._sync.ask()
+        self._sync.ask(sum(self.committed.counts.values()))
 
     def close(self, *, wait: bool = True) -> BackgroundSync:
         """Commit and close.

@@ -170,6 +170,12 @@ class RunFiles:
                 total[names[number]] += count
         return total
 
+    @property
+    def safe_messages(self) -> int:
+        """How many messages no loss of power can take any more."""
+        finished = sum(piece.sync.messages for piece in self._pieces)
+        return finished + (self._file.safe_messages if len(self._pieces) < self._begun else 0)
+
     def _name(self, number: int) -> str:
         return f'{self._folder.name}_{number}.mcap'
 

@@ -176,6 +176,11 @@ class RunWriter:
         """Messages on disk by name of topic."""
         return self._files.counts
 
+    @property
+    def safe_messages(self) -> int:
+        """How many messages no loss of power can take any more."""
+        return self._files.safe_messages
+
     def _send_chunk(self) -> None:
         """Hand the messages gathered so far to the thread."""
         if self._chunk.has_messages:
