@@ -30,6 +30,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.recording import RunWriter, Topic, read_run, verify
+from lathe_chatter.recording.identity import IDENTITY, identity
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 ARRAY = 'std_msgs/msg/Float64MultiArray'
@@ -132,20 +133,22 @@ def measure_reading() -> None:
 def read_here(run: str, columns: str) -> None:
     """Read columns of a run, and say what it took."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    began = time.perf_counter()
+    began, busy = time.perf_counter(), time.process_time()
     found = read_run(run).samples(columns=columns.split(','))
-    taken = time.perf_counter() - began
+    taken, busy = time.perf_counter() - began, time.process_time() - busy
     memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e6
     size = len(next(iter(found.columns.values())))
     print(
         f'reading: {size / 1e6:.0f} million samples, {len(found.columns)} columns, in '
-        f'{taken:.2f} s with {memory:.2f} GB more than before, gaps {len(found.gaps)}'
+        f'{taken:.2f} s ({busy:.2f} s of processor time) with '
+        f'{memory:.2f} GB more than before, gaps {len(found.gaps)}'
     )
 
 
 def record_for_ever(run: str) -> None:
     """Record 500 messages a second until killed, saying the last number that was written."""
     writer = RunWriter(Path(run))
+    writer.note(IDENTITY, identity())
     writer.add_topic(samples_topic())
     began = time.monotonic()
     for k, data in enumerate(blocks(1 << 30)):
@@ -176,16 +179,16 @@ def measure_kills(kills: int) -> None:
             child.wait()
             written = int.from_bytes(said, 'little')
             try:
-                found = {count_by_mcap(run), count_by_rosbags(run)}
+                found = {count_by_mcap(run), count_by_rosbags(run), count_by_verify(run)}
             except Exception as error:  # noqa: BLE001 -- whatever a reader raises is a refusal
                 refused += 1
                 print(f'kills: {run.name} was refused: {error}')
                 continue
-            assert len(found) == 1  # noqa: S101 -- both readers read the same
+            assert len(found) == 1  # noqa: S101 -- all readers read the same
             lost.append((written - found.pop()) * TICK / 1e9)
     print(
-        f'kills: {kills - refused} of {kills} files open in mcap and rosbags; lost at most '
-        f'{max(lost):.3f} s, {np.median(lost):.3f} s in the median'
+        f'kills: {kills - refused} of {kills} files open in mcap and rosbags, and verify '
+        f'counts the same; lost at most {max(lost):.3f} s, {np.median(lost):.3f} s in the median'
     )
 
 
@@ -199,6 +202,19 @@ def count_by_rosbags(run: Path) -> int:
     """Messages that rosbags finds."""
     with Reader(run) as reader:
         return sum(1 for _ in reader.messages())
+
+
+def count_by_verify(run: Path) -> int:
+    """Messages that verify finds in a run that, as it must say, was not finished."""
+    found = verify(run)
+    assert not found.complete  # noqa: S101 -- it was killed
+    return found.messages['/lathe/samples']
+
+
+def seconds_of(process: subprocess.Popen[bytes]) -> float:
+    """Processor time that a process has had, s."""
+    fields = Path(f'/proc/{process.pid}/stat').read_text(encoding='ascii').rpartition(')')[2]
+    return sum(map(int, fields.split()[11:13])) / os.sysconf('SC_CLK_TCK')
 
 
 def measure_stalls(seconds: float) -> None:
@@ -229,6 +245,7 @@ def measure_stalls(seconds: float) -> None:
             recorder.send_signal(signal.SIGSTOP)
             time.sleep(0.3)
             recorder.send_signal(signal.SIGCONT)
+        busy = seconds_of(recorder) / seconds
         for process in (*others[::-1], recorder):
             process.send_signal(signal.SIGINT)
             process.wait(60)
@@ -236,7 +253,8 @@ def measure_stalls(seconds: float) -> None:
         count = found.samples['/lathe/samples']
         print(
             f'stalls: {sum(found.messages.values())} messages and {count.samples} samples in '
-            f'{seconds:.0f} s; complete: {found.complete}'
+            f'{seconds:.0f} s; complete: {found.complete}; recorder {100 * busy:.0f} % of a core, '
+            'its start included'
         )
         for finding in found.findings:
             print(f'stalls: {finding.text}')

@@ -24,7 +24,13 @@ from lathe_chatter.nodes.recording_status import recording_status
 from lathe_chatter.nodes.running import run_node
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.closing import SUMMARY, closing_summary
-from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, RECEPTION, identity
+from lathe_chatter.recording.identity import (
+    IDENTITY,
+    PARAMETERS,
+    RECEPTION,
+    STALLS,
+    identity,
+)
 from lathe_chatter.recording.journal import Journal
 from lathe_chatter.recording.stalls import Stalls
 
@@ -147,7 +153,7 @@ class RecorderNode(ParameterNode):
             topic.end()
         writer, self._writer = self._writer, None
         heard = {name: json.dumps(topic.reception()) for name, topic in self._topics.items()}
-        stalls = {'stalls': str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
+        stalls = {STALLS: str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
         try:
             writer.note(RECEPTION, {**heard, **stalls})
             writer.note(SUMMARY, closing_summary(self._journal, self._noted))

@@ -20,6 +20,9 @@ PARAMETERS = 'lathe_chatter/parameters'
 RECEPTION = 'lathe_chatter/reception'
 """Name of the record of what came and what was lost on the way, by topic, as JSON."""
 
+STALLS = 'stalls'
+"""Among these, how often the recorder took too long to take what had come."""
+
 RECOVERED = 'lathe_chatter/recovered'
 """Name of the record of a run that was recovered: from which, and what could not be read."""
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.recording.identity import IDENTITY, RECEPTION, RECOVERED
+from lathe_chatter.recording.identity import IDENTITY, RECEPTION, RECOVERED, STALLS
 from lathe_chatter.recording.metadata import FILE_NAME
 from lathe_chatter.recording.numbering import Numbering
 from lathe_chatter.recording.reader import Run, read_run
@@ -167,6 +167,12 @@ def _check_samples(found: Verification) -> None:
         except (LayoutError, ValueError) as error:
             found.lose(f'{topic}: {error}')
         found.samples[topic] = SampleCount(count, first, last)
+        late = round(first / seams.step) - 1 if count and seams.step else 0
+        if late > 0:
+            found.remark(
+                f'{topic}: the record begins at {first:.6f} s of simulated time, {late} samples '
+                'late.'
+            )
         for before, after in seams.gaps:
             missing = round((after - before) / seams.step) - 1
             found.lose(
@@ -208,6 +214,8 @@ def _check_reception(
             continue
         for topic in note.values:
             heard = _values(note, topic)
+            if topic == STALLS and heard:
+                found.remark(f'The recorder stood still {heard} times.')
             if not isinstance(heard, dict):
                 continue
             lost, there = heard.get('lost', 0), found.messages[topic]

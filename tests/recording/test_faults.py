@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from recording.conftest import STORE, number, topic
 from recording.test_reader import ARRAY, block
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -193,3 +195,42 @@ def test_a_run_of_another_recorder_is_verified_and_read_too(
     joined = np.column_stack(list(columns.values()))
     assert joined.tobytes() == np.concatenate(blocks).tobytes()
     assert not verify(write(tmp_path / 'lossy', blocks[:9] + blocks[10:])).complete
+
+
+@pytest.mark.parametrize(
+    ('compression', 'crcs'),
+    [(CompressionType.NONE, False), (CompressionType.NONE, True), (CompressionType.ZSTD, False)],
+)
+def test_a_file_as_ros2_bag_record_leaves_it_is_verified_by_its_payload(
+    compression: CompressionType, crcs: bool, blocks: list[Array], tmp_path: Path
+) -> None:
+    """As rosbag2's plugin writes: its profile, chunks of 768 KiB, no sequence numbers."""
+    described = topic('/lathe/samples', ARRAY)
+    for name, kept in (('whole', blocks), ('part', [*blocks[5:30], *blocks[31:]])):
+        with (tmp_path / f'{name}_0.mcap').open('wb') as stream:
+            writer = McapWriter(
+                stream,
+                chunk_size=768 * 1024,
+                compression=compression,
+                enable_crcs=crcs,
+                enable_data_crcs=crcs,
+            )
+            writer.start(profile='ros2', library='libmcap 1.3.0')
+            text = described.definition.encode()
+            schema = writer.register_schema(described.type, 'ros2msg', text)
+            qos = {'offered_qos_profiles': ''}
+            channel = writer.register_channel(described.name, 'cdr', schema, qos)
+            for k, samples in enumerate(kept):
+                time = START + k * 2_000_000
+                writer.add_message(channel, time, block(samples), time, 0)
+            writer.finish()
+    assert verify(tmp_path / 'whole_0.mcap').findings == []
+    found = read_run(tmp_path / 'whole_0.mcap').samples()
+    assert np.column_stack(list(found.columns.values())).tobytes() == (
+        np.concatenate(blocks).tobytes()
+    )
+    late, lost = verify(tmp_path / 'part_0.mcap').findings
+    assert not late.loss
+    assert 'begins at 0.010100 s of simulated time, 100 samples late' in late.text
+    assert lost.loss
+    assert '20 samples are missing between 0.060000 s and 0.062100 s' in lost.text
