@@ -54,6 +54,7 @@ class History:
         changes: Of the cut, in order.
         flags: Of the monitor, in order.
         estimates: Growth rate, frequency and so on by name: simulated times and values (2, m).
+        tool_leaves_cut: The force law, see `VirtualLathe`.
     """
 
     path: Path
@@ -63,6 +64,7 @@ class History:
     changes: list[Change] = field(default_factory=list)
     flags: list[Flag] = field(default_factory=list)
     estimates: dict[str, Array] = field(default_factory=dict)
+    tool_leaves_cut: bool = True
 
     def cut_at(self, time: float) -> Cut:
         """The cut in force at a simulated time, s."""
@@ -112,6 +114,7 @@ def read_history(path: Path) -> History:
         changes=list(told.changes),
         flags=_flags(run, samples, estimates),
         estimates=estimates,
+        tool_leaves_cut=bool(told.parameters.get('tool_leaves_cut', True)),
     )
 
 

@@ -15,6 +15,7 @@ from rich.table import Table
 from lathe_chatter.changes import on_the_shop_floor
 from lathe_chatter.history import History, read_history
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.moments import Moment, moments_of
 from lathe_chatter.pictures import draw_run
 from lathe_chatter.stability import rightmost_root
 
@@ -23,6 +24,8 @@ HELP = 'print what happened in a recorded run and draw it'
 EXAMPLE = 'lathe-chatter report runs/20260401-120000'
 
 PICTURE = 'report.png'
+_ROUNDING = 1e-12
+"""m: what moves less has no frequency worth a name."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -64,7 +67,27 @@ def show_run(history: History, console: Console) -> dict[str, Any]:
     picture = history.path / PICTURE
     draw_run(history, picture)
     console.print(f'run      {history.path}\npicture  {picture}', soft_wrap=True)
-    return {'run': str(history.path), 'picture': str(picture), 'occurrences': occurrences}
+    return {
+        'run': str(history.path),
+        'picture': str(picture),
+        'occurrences': occurrences,
+        'moments': [_moment_figures(moment) for moment in moments_of(history)],
+    }
+
+
+def _moment_figures(moment: Moment) -> dict[str, Any]:
+    """What the portraits and spectra show, as figures."""
+    spectrum = moment.spectrum('tool_displacement')
+    moved = spectrum.amplitude.size > 0 and spectrum.amplitude.max() > _ROUNDING
+    return {
+        'title': moment.title,
+        'time': moment.until,
+        'tool_peak_to_peak': _known(moment.size('tool_displacement')),
+        'workpiece_peak_to_peak': _known(moment.size('workpiece_displacement')),
+        'frequency': spectrum.peak if moved else None,
+        'out_of_cut': moment.out_of_cut,
+        'on_bearing': moment.on_bearing,
+    }
 
 
 def _pair(frequency: float | None, growth_rate: float | None) -> str:

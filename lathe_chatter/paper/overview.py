@@ -10,8 +10,9 @@ import numpy as np
 from lathe_chatter.model import Array, BearingContact, Cut, Machine
 from lathe_chatter.paper.findings import Findings
 from lathe_chatter.paper.reproduction import SAMPLE_RATE, Reproduced, paper_lathe
-from lathe_chatter.pictures.chart import draw_chart
+from lathe_chatter.pictures.chart import chart_speeds, draw_limits
 from lathe_chatter.pictures.style import OPEN, SAFE, SEATED, grid, new_figure, save
+from lathe_chatter.stability import safe_limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,10 +76,9 @@ def draw_conditions(results: list[Reproduced], path: Path) -> None:
     axes = figure.subplots()
     # The paper's force has no mean, so nothing seats the workpiece: there is no seating line.
     cut = Cut(bearing_contact=BearingContact.GAP)
-    draw_chart(
-        axes, Machine(), cut, low_rpm=1500.0, high_rpm=12000.0, depth_limit=1.6e-3,
-        tool_leaves_cut=False, shade=False,
-    )  # fmt: skip
+    speeds = chart_speeds(1500.0, 12000.0)
+    limits = safe_limit(Machine(), cut, speeds, tool_leaves_cut=False)
+    draw_limits(axes, limits, cut.bearing_contact, 1.6e-3, shade=False)
     for has_bearing, colour, marker in ((False, OPEN, 'o'), (True, SEATED, 's')):
         for result in results:
             run = result.run

@@ -1,4 +1,4 @@
-"""Pictures of a run: readable at a glance, the same colours for the same things throughout."""
+"""The picture of a run: over time, at its moments, and on the stability chart."""
 
 from __future__ import annotations
 
@@ -10,64 +10,111 @@ import numpy as np
 from lathe_chatter.changes import on_the_shop_floor
 from lathe_chatter.history import History
 from lathe_chatter.model import BearingContact
-from lathe_chatter.pictures.style import ALARM, NEUTRAL, TOOL, WORKPIECE, envelope, new_figure
+from lathe_chatter.moments import moments_of
+from lathe_chatter.pictures.moment import draw_portrait, draw_section, draw_spectrum
+from lathe_chatter.pictures.path import bearings_of, draw_path
+from lathe_chatter.pictures.style import (
+    ALARM,
+    ALARM_TEXT,
+    NEUTRAL,
+    TOOL,
+    WORKPIECE,
+    envelope,
+    grid,
+    new_figure,
+    save,
+    scale_for,
+)
+from lathe_chatter.stability import contact_at, rightmost_root
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MICRO = 1e6
-_WINDOW = 0.25
-"""s of cutting that a phase portrait or a spectrum shows."""
+_LABEL_WIDTH = 0.12
+"""Of the picture, that a label above it takes."""
+_BODIES = (('tool', TOOL), ('workpiece', WORKPIECE))
 
 
 def draw_run(history: History, path: Path) -> None:
-    """Draw a run over time, and what the cut was like before, during and after chatter.
+    """Draw a run: time histories, phase portraits, spectra, sections and the chart.
 
     Args:
         history: The run.
-        path: Of the PNG file to write.
+        path: Of the PNG file to write; an SVG is put beside it.
     """
-    figure = new_figure(12.0, 10.5)
-    rows = figure.add_gridspec(4, 3, height_ratios=[1.1, 1.1, 0.8, 1.3])
-    tool = figure.add_subplot(rows[0, :])
-    workpiece = figure.add_subplot(rows[1, :], sharex=tool)
-    growth = figure.add_subplot(rows[2, :], sharex=tool)
-    time = history.samples['time']
-    for axes, name, colour in (
-        (tool, 'tool', TOOL),
-        (workpiece, 'workpiece', WORKPIECE),
-    ):
-        envelope(axes, time, history.samples[f'{name}_displacement'] * _MICRO, colour)
-        axes.set_ylabel(f'{name}\ndisplacement / µm')
-        axes.tick_params(labelbottom=False)
-    if history.start.bearing_contact is not BearingContact.NONE:
-        edges = [0.0, *(change.time for change in history.changes), history.duration]
-        gaps = [history.cut_at(edge).bearing_clearance * _MICRO for edge in edges]
-        workpiece.step(
-            edges, gaps, where='post', color='k', lw=1, ls='--', label='bearing clearance'
-        )
-        workpiece.legend(loc='upper left', frameon=False)
-    _draw_growth(growth, history)
-    for axes in (tool, workpiece, growth):
+    figure = new_figure(12.0, 21.0)
+    rows = figure.add_gridspec(8, 1, height_ratios=[1.0, 1.0, 0.7, 0.8, 1.5, 1.1, 1.3, 1.7])
+    tool = figure.add_subplot(rows[0])
+    workpiece, force, growth = (figure.add_subplot(rows[k], sharex=tool) for k in (1, 2, 3))
+    _draw_displacements(tool, workpiece, history)
+    _draw_force(force, history)
+    _draw_rates(growth, history)
+    for axes in (tool, workpiece, force, growth):
         _mark(axes, history)
-        axes.grid(visible=True, alpha=0.25)
+        grid(axes)
         axes.margins(x=0.0)
+        axes.tick_params(labelbottom=axes is growth)
     _label_changes(tool, history)
-    moments = _moments(history)
-    for place, (title, moment) in enumerate(moments):
-        _draw_moment(figure.add_subplot(rows[3, place]), history, title, moment)
-    figure.savefig(path, dpi=110)
+    moments = moments_of(history)
+    for row, draw in ((4, draw_portrait), (5, draw_spectrum), (6, draw_section)):
+        cells = rows[row].subgridspec(1, len(moments))
+        for place, moment in enumerate(moments):
+            draw(figure.add_subplot(cells[place]), history, moment)
+    bearings = bearings_of(history)
+    cells = rows[7].subgridspec(1, len(bearings))
+    for place, bearing in enumerate(bearings):
+        draw_path(figure.add_subplot(cells[place]), history, bearing)
+    save(figure, path)
 
 
-def _draw_growth(axes: Axes, history: History) -> None:
-    """What the monitor said of the growth rate; above zero chatter builds."""
+def _draw_displacements(tool: Axes, workpiece: Axes, history: History) -> None:
+    """Both envelopes, and the clearance where there is one."""
+    time = history.samples['time']
+    for axes, (name, colour) in zip((tool, workpiece), _BODIES, strict=True):
+        values = history.samples[f'{name}_displacement']
+        scale = scale_for('m', values)
+        envelope(axes, time, values * scale.factor, colour)
+        axes.set_ylabel(f'{name}\n{scale.label("displacement")}')
+        if name == 'workpiece' and history.start.bearing_contact is not BearingContact.NONE:
+            edges = [0.0, *(change.time for change in history.changes), history.duration]
+            gaps = [history.cut_at(edge).bearing_clearance * scale.factor for edge in edges]
+            axes.step(
+                edges, gaps, where='post', color='k', lw=1, ls='--', label='bearing clearance'
+            )
+            axes.legend(loc='upper left', frameon=False)
+
+
+def _draw_force(axes: Axes, history: History) -> None:
+    """The cutting force: at zero the tool is out of the cut."""
+    values = history.samples['cutting_force']
+    scale = scale_for('N', values)
+    envelope(axes, history.samples['time'], values * scale.factor, NEUTRAL)
+    axes.set_ylabel(scale.label('cutting\nforce'))
+
+
+def _draw_rates(axes: Axes, history: History) -> None:
+    """Growth rates: what the monitor measured, and the root of the cut in force."""
+    edges = [0.0, *(change.time for change in history.changes), history.duration]
+    rates = []
+    for edge in edges:
+        cut = history.cut_at(edge)
+        contact = contact_at(history.machine, cut, tool_leaves_cut=history.tool_leaves_cut)
+        root = rightmost_root(
+            history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
+        )
+        rates.append(root.real)
+    axes.step(edges, rates, where='post', color='k', lw=1.2, ls='--', label='rightmost root')
     known = history.estimates.get('growth_rate')
+    low, high = min(rates), max(rates)
     if known is not None and known.shape[1]:
-        axes.plot(known[0], known[1], color=NEUTRAL, lw=1.0)
-        low, high = np.nanpercentile(known[1], [2, 98])
-        axes.set_ylim(min(1.3 * low, -5.0), max(1.3 * high, 5.0))
+        axes.plot(known[0], known[1], color=NEUTRAL, lw=1.0, label='monitor')
+        spread = np.nanpercentile(known[1], [2, 98])
+        low, high = min(low, spread[0]), max(high, spread[1])
+    margin = 0.15 * max(high - low, 1.0)
+    axes.set_ylim(min(low - margin, -5.0), max(high + margin, 5.0))
     axes.axhline(0.0, color='k', lw=0.8)
-    axes.set_ylabel('growth rate\n(monitor) / s$^{-1}$')
+    axes.legend(loc='upper left', frameon=False, ncols=2, fontsize=9)
+    axes.set_ylabel('growth rate / s$^{-1}$')
     axes.set_xlabel('simulated time / s')
 
 
@@ -81,10 +128,15 @@ def _mark(axes: Axes, history: History) -> None:
 
 def _label_changes(axes: Axes, history: History) -> None:
     """Say above the plot what changed, and where the flag was up."""
+    last, height = -history.duration, 4
     for change in history.changes:
         text = '\n'.join(on_the_shop_floor(name, value) for name, value in change.new.items())
+        # One that would run into the one before stands above it.
+        near = change.time - last < _LABEL_WIDTH * history.duration
+        height = height + 12 * (text.count('\n') + 1) if near else 4
+        last = change.time
         axes.annotate(
-            text, (change.time, 1.0), (3, 4), xycoords=('data', 'axes fraction'),
+            text, (change.time, 1.0), (3, height), xycoords=('data', 'axes fraction'),
             textcoords='offset points', fontsize=9, va='bottom',
         )  # fmt: skip
     spans = history.chatter_spans()
@@ -92,49 +144,5 @@ def _label_changes(axes: Axes, history: History) -> None:
         start, _ = spans[0]
         axes.annotate(
             'chatter flagged', (max(start, 0.0), 0.04), (3, 0), xycoords=('data', 'axes fraction'),
-            textcoords='offset points', fontsize=9, color='#8a3c66',
+            textcoords='offset points', fontsize=9, color=ALARM_TEXT,
         )  # fmt: skip
-
-
-def _moments(history: History) -> list[tuple[str, float]]:
-    """Up to three instants worth a closer look: before the first change, chatter, the end."""
-    end = history.duration
-    first = history.changes[0].time if history.changes else end
-    result = [('before the first change', first)]
-    spans = history.chatter_spans()
-    if spans:
-        start, stop = spans[0]
-        inside = [change.time for change in history.changes if start < change.time < stop]
-        result.append(('chatter', inside[0] if inside else stop))
-    if end > first:
-        result.append(('at the end', end))
-    return result
-
-
-def _draw_moment(axes: Axes, history: History, title: str, until: float) -> None:
-    """Phase portraits of tool and workpiece in the last part of a second before an instant."""
-    samples = history.samples
-    inside = (samples['time'] > until - _WINDOW) & (samples['time'] <= until)
-    for name, colour in (('tool', TOOL), ('workpiece', WORKPIECE)):
-        axes.plot(
-            samples[f'{name}_displacement'][inside] * _MICRO,
-            samples[f'{name}_velocity'][inside] * 1e3,
-            color=colour, lw=0.8, label=name, marker='o', ms=3, markevery=[-1],
-        )  # fmt: skip
-    # A cut at rest is a point: without a floor the axes would show rounding as motion.
-    for low_high, setter in (
-        (axes.get_xlim(), axes.set_xlim),
-        (axes.get_ylim(), axes.set_ylim),
-    ):
-        middle, half = 0.5 * sum(low_high), 0.5 * (low_high[1] - low_high[0])
-        setter(middle - max(half, 0.5), middle + max(half, 0.5))
-    cut = history.cut_at(until - 0.5 * _WINDOW)
-    axes.set_title(
-        f'{title} (to {until:.2f} s)\n{cut.spindle_speed_rpm:g} rev/min, '
-        f'{cut.depth_of_cut * 1e3:g} mm',
-        fontsize=10,
-    )
-    axes.set_xlabel('displacement / µm')
-    axes.set_ylabel('velocity / (mm/s)')
-    axes.grid(visible=True, alpha=0.25)
-    axes.legend(loc='upper right', frameon=False, fontsize=8)

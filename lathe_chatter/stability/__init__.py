@@ -13,6 +13,7 @@ from lathe_chatter.stability.advice import (
     recommend_speeds,
     stable_speed_intervals,
 )
+from lathe_chatter.stability.growth_map import GrowthMap, growth_map
 from lathe_chatter.stability.lobes import (
     LobeBoundary,
     critical_depth,
@@ -39,6 +40,7 @@ __all__ = [
     'ContactAt',
     'CuttingAdvice',
     'Floquet',
+    'GrowthMap',
     'LobeBoundary',
     'SafeLimit',
     'SpeedAdvice',
@@ -48,6 +50,7 @@ __all__ = [
     'critical_depths',
     'dominant_eigenvalue',
     'floquet',
+    'growth_map',
     'leading_roots',
     'lobe_boundary',
     'recommend_speeds',
