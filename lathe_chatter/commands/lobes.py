@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from lathe_chatter.commands.parameter_options import add_parameter_options, setup_of
+from lathe_chatter.commands.parameter_options import add_parameter_options, start_of
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Array, BearingContact
 from lathe_chatter.pictures.chart import chart_speeds, draw_lobes
 from lathe_chatter.quantities import Quantity
-from lathe_chatter.setup import Setup
 from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map, safe_limit
+from lathe_chatter.start import Start
 
 NAME = 'lobes'
 HELP = 'draw the stability chart: both limits, the seating line and the safe region'
@@ -64,31 +64,33 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Draw and print the chart."""
-    setup = setup_of(options)
+    start = start_of(options)
     low, high = _SPEED.check('--from', options.low), _SPEED.check('--to', options.high)
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
     speeds = chart_speeds(low, high)
-    limits = safe_limit(setup.machine, setup.cut, speeds, tool_leaves_cut=setup.tool_leaves_cut)
+    limits = safe_limit(
+        start.machine, start.cut, speeds, tool_leaves_cut=start.setup.tool_leaves_cut
+    )
     top = _top(limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
     console = Console(stderr=options.json, highlight=False)
-    varied = setup.cut.speed_variation_amplitude > 0.0
+    varied = start.cut.speed_variation_amplitude > 0.0
     growth = None
     if options.map or varied:
         with console.status('Computing the growth rates ...'):
-            growth = _map(setup, low, high, top, varied=varied)
+            growth = _map(start, low, high, top, varied=varied)
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
-        draw_lobes(setup, limits, growth, top, options.output)
+        draw_lobes(start, limits, growth, top, options.output)
         if options.csv is not None:
-            _write_csv(options.csv, setup, limits)
+            _write_csv(options.csv, start, limits)
     except OSError as error:
         raise OutputError(f'{error.filename} cannot be written: {error.strerror}.') from None
-    _show(setup, limits, console)
+    _show(start, limits, console)
     console.print(f'picture  {options.output}', soft_wrap=True)
     if options.json:
-        text = json.dumps(_figures(setup, limits, growth))
+        text = json.dumps(_figures(start, limits, growth))
         Console(highlight=False, soft_wrap=True).print(text)
     return 0
 
@@ -99,43 +101,43 @@ def _top(limits: SafeLimit) -> float:
     return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
 
 
-def _map(setup: Setup, low: float, high: float, top: float, *, varied: bool) -> GrowthMap:
+def _map(start: Start, low: float, high: float, top: float, *, varied: bool) -> GrowthMap:
     columns, rows = _VARIED_MAP if varied else _MAP
     return growth_map(
-        setup.machine,
-        setup.cut,
+        start.machine,
+        start.cut,
         np.linspace(low, high, columns),
         np.linspace(top / rows, top, rows),
-        tool_leaves_cut=setup.tool_leaves_cut,
+        tool_leaves_cut=start.setup.tool_leaves_cut,
     )
 
 
-def _columns(setup: Setup, limits: SafeLimit) -> dict[str, Array]:
+def _columns(start: Start, limits: SafeLimit) -> dict[str, Array]:
     """The chart as columns; without what the machine has not."""
     columns = {
         'spindle_speed_rpm': limits.spindle_speed_rpm,
         'safe_depth': limits.depth_of_cut,
         'open_limit': limits.open_limit,
     }
-    if setup.cut.bearing_contact is not BearingContact.NONE:
+    if start.cut.bearing_contact is not BearingContact.NONE:
         columns |= {'seated_limit': limits.seated_limit, 'seating_line': limits.seating_line}
     return columns
 
 
-def _write_csv(path: Path, setup: Setup, limits: SafeLimit) -> None:
+def _write_csv(path: Path, start: Start, limits: SafeLimit) -> None:
     """Limits over speed, m and rev/min; an infinite limit is `inf`."""
-    columns = _columns(setup, limits)
+    columns = _columns(start, limits)
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
-def _figures(setup: Setup, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
+def _figures(start: Start, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
     """As JSON holds it: an infinite limit is null."""
     found: dict[str, Any] = {
         name: [value if math.isfinite(value) else None for value in values.tolist()]
-        for name, values in _columns(setup, limits).items()
+        for name, values in _columns(start, limits).items()
     }
     if growth is not None:
         found['map'] = {
@@ -144,13 +146,13 @@ def _figures(setup: Setup, limits: SafeLimit, growth: GrowthMap | None) -> dict[
             'growth_rate': growth.growth_rate.tolist(),
             'seated': growth.seated.tolist(),
         }
-    return {'parameters': setup.parameters(), **found}
+    return {'parameters': start.parameters(), **found}
 
 
-def _show(setup: Setup, limits: SafeLimit, console: Console) -> None:
+def _show(start: Start, limits: SafeLimit, console: Console) -> None:
     """The lowest limits, and what holds at the speed of the cut."""
     names = [('open', limits.open_limit)]
-    if setup.cut.bearing_contact is not BearingContact.NONE:
+    if start.cut.bearing_contact is not BearingContact.NONE:
         names.append(('on its bearing', limits.seated_limit))
     names.append(('safe', limits.depth_of_cut))
     for name, values in names:

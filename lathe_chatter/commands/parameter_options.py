@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from typing import Any
 
 from lathe_chatter.model import BearingContact
-from lathe_chatter.setup import Setup, parameter_names, setup_from
+from lathe_chatter.start import Start, parameter_names, start_from
 
 
 def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()) -> None:
     """Declare an option for every parameter of a lathe, but for some."""
-    usual = Setup().parameters()
+    usual = Start().parameters()
     group = parser.add_argument_group('the lathe', 'in SI units; speeds in rev/min')
     for name, limits in parameter_names():
         if name in without:
@@ -40,13 +40,13 @@ def given_parameters(options: Namespace) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def setup_of(options: Namespace) -> Setup:
+def start_of(options: Namespace) -> Start:
     """The lathe that the options describe.
 
     Raises:
         ParameterError: If a value is not allowed.
     """
-    return setup_from(given_parameters(options))
+    return start_from(given_parameters(options))
 
 
 def _number(text: str) -> Any:

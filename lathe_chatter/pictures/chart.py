@@ -9,8 +9,8 @@ import numpy as np
 
 from lathe_chatter.model import Array, BearingContact
 from lathe_chatter.pictures.style import LINE, OPEN, SAFE, SEATED, grid, new_figure, save
-from lathe_chatter.setup import Setup
 from lathe_chatter.stability import GrowthMap, SafeLimit
+from lathe_chatter.start import Start
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,12 +28,12 @@ def chart_speeds(low_rpm: float, high_rpm: float) -> Array:
 
 
 def draw_lobes(
-    setup: Setup, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
+    start: Start, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
 ) -> None:
     """Draw a chart with its point of operation, as PNG and SVG.
 
     Args:
-        setup: The machine and its cut.
+        start: The machine and its cut.
         limits: Over rising speeds.
         growth: To colour the chart with, or None.
         depth_limit: Top of the chart, m.
@@ -41,7 +41,7 @@ def draw_lobes(
     """
     figure = new_figure(11.0, 6.0)
     axes = figure.subplots()
-    cut = setup.cut
+    cut = start.cut
     varied = cut.speed_variation_amplitude > 0.0
     if growth is not None:
         _draw_growth(axes, growth, zero=varied)
