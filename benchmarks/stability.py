@@ -3,8 +3,9 @@
     python benchmarks/stability.py [--repeats 7] [--machines 200] [--json]
 
 Times are medians of several repeats, CPU time in one thread, so that a busy machine tells the
-same as an idle one. Errors are taken against other ways to the
-same number: collocation with twice the nodes it needs, a constant speed, a finer mesh.
+same as an idle one (`lathe-chatter bench stability` prints these alone). Errors are taken against
+other ways to the same number: collocation with twice the nodes it needs, a constant speed, a
+finer mesh.
 """
 
 from __future__ import annotations
@@ -20,45 +21,28 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from lathe_chatter import stability
-from lathe_chatter.model import Cut, Machine
+from lathe_chatter.bench import Figure, this_machine
+from lathe_chatter.bench.stability import (
+    DEPTHS,
+    MACHINE,
+    MANY_SPEEDS,
+    SPEEDS,
+    growth_map,
+    stability_figures,
+    varied_cuts,
+)
 
 sys.path.append(str(Path(__file__).parents[1] / 'tests'))
 
 from machines import random_machine
 from reference import collocation
-
-MACHINE = Machine()
-SPEEDS = np.linspace(1000.0, 12000.0, 111)
-DEPTHS = np.linspace(0.05e-3, 2e-3, 38)
-MANY_SPEEDS = np.linspace(1000.0, 12000.0, 300)
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One line of the table."""
-
-    name: str
-    value: float
-    unit: str
-
-
-def median_time(work: Callable[[], Any], repeats: int) -> float:
-    """Median duration of some calls after a first one, s."""
-    work()
-    durations = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        durations.append(time.process_time() - start)
-    return statistics.median(durations)
 
 
 def import_time(repeats: int) -> float:
@@ -74,12 +58,8 @@ def import_time(repeats: int) -> float:
     return statistics.median(durations)
 
 
-def roots(repeats: int) -> list[Figure]:
-    """The growth map and single roots, with their errors."""
-
-    def growth_map() -> Any:
-        return stability.rightmost_roots(MACHINE, SPEEDS, DEPTHS[:, None], seated=False)
-
+def errors_of_roots() -> list[Figure]:
+    """The growth map against collocation at another resolution, point by point."""
     found = growth_map()
     rng = np.random.default_rng(0)
     rows, columns = rng.integers(DEPTHS.size, size=200), rng.integers(SPEEDS.size, size=200)
@@ -87,34 +67,26 @@ def roots(repeats: int) -> list[Figure]:
     for row, column in zip(rows, columns, strict=True):
         expected = collocation.rightmost_root(MACHINE, SPEEDS[column], DEPTHS[row], seated=False)
         errors.append(abs(found[row, column].real - expected.real))
-    duration = median_time(growth_map, repeats)
-    figures = [
-        Figure('growth map 111 x 38, every point proven', duration, 's'),
-        Figure('largest error of 200 of its points against collocation', max(errors), '1/s'),
-    ]
-    for rpm in (60.0, 300.0, 3000.0, 12000.0):
-        spent = median_time(
-            lambda rpm=rpm: stability.rightmost_root(MACHINE, rpm, 1e-3, seated=False), repeats
-        )
-        figures.append(Figure(f'rightmost root at {rpm:g} rev/min, proven', 1e3 * spent, 'ms'))
-    return figures
-
-
-def limits(repeats: int) -> list[Figure]:
-    """Limits in closed form."""
-    boundary = median_time(
-        lambda: stability.lobe_boundary(MACHINE, seated=False, lobes=20, points=10_000), repeats
-    )
-    one = median_time(lambda: stability.critical_depth(MACHINE, 3000.0, seated=False), repeats)
-    many = median_time(lambda: stability.safe_limit(MACHINE, Cut(), MANY_SPEEDS), repeats)
-    depths = stability.critical_depths(MACHINE, MANY_SPEEDS, seated=True)
-    growth = stability.rightmost_roots(MACHINE, MANY_SPEEDS, depths, seated=True).real
     return [
-        Figure('lobe boundary, 200 000 points', 1e3 * boundary, 'ms'),
-        Figure('critical depth at one speed', 1e3 * one, 'ms'),
-        Figure('safe region at 300 speeds', 1e3 * many, 'ms'),
-        Figure('largest growth rate at 300 critical depths', float(np.abs(growth).max()), '1/s'),
+        Figure('largest error of 200 points of the map against collocation', max(errors), '1/s')
     ]
+
+
+def errors_of_limits() -> list[Figure]:
+    """How far the rightmost root at a critical depth is from the axis, and so the depth."""
+    figures = []
+    for seated in (False, True):
+        depths = stability.critical_depths(MACHINE, MANY_SPEEDS, seated=seated)
+        below, at, above = (
+            stability.rightmost_roots(MACHINE, MANY_SPEEDS, share * depths, seated=seated).real
+            for share in (1.0 - 1e-4, 1.0, 1.0 + 1e-4)
+        )
+        slope = (above - below) / (2e-4 * depths)
+        name = 'on its bearing' if seated else 'open'
+        figures.append(
+            Figure(f'largest error of 300 critical depths, {name}', np.abs(at / slope).max(), 'm')
+        )
+    return figures
 
 
 def advice(machines: int) -> list[Figure]:
@@ -144,26 +116,23 @@ def advice(machines: int) -> list[Figure]:
     ]
 
 
-def variation(repeats: int) -> list[Figure]:
-    """Floquet multipliers under sinusoidal speed variation."""
-    figures, constant, refined = [], [], []
-    for rpm, frequency in ((1000.0, 1.0), (3000.0, 5.0), (9000.0, 30.0)):
-        steady = Cut(rpm, 1e-3, speed_variation_frequency=frequency)
-        cut = steady.with_changes(speed_variation_amplitude=0.2)
-        root = stability.rightmost_root(MACHINE, rpm, 1e-3, seated=False)
-        rate = stability.floquet(MACHINE, steady, seated=False).growth_rate
-        constant.append(abs(rate - root.real))
+def errors_of_variation() -> list[Figure]:
+    """Floquet multipliers at a constant speed, and with twice the elements."""
+    constant, refined = [], []
+    for cut in varied_cuts():
+        steady = cut.with_changes(speed_variation_amplitude=0.0)
+        root = stability.rightmost_root(
+            MACHINE, cut.spindle_speed_rpm, cut.depth_of_cut, seated=False
+        )
+        constant.append(
+            abs(stability.floquet(MACHINE, steady, seated=False).growth_rate - root.real)
+        )
         rates = [
             stability.floquet(MACHINE, cut, seated=False, refinement=k).growth_rate for k in (1, 2)
         ]
         refined.append(abs(rates[0] - rates[1]))
-        spent = median_time(lambda cut=cut: stability.floquet(MACHINE, cut, seated=False), repeats)
-        figures.append(
-            Figure(f'speed variation, {rpm:g} rev/min at {frequency:g} Hz', 1e3 * spent, 'ms')
-        )
     return [
-        *figures,
-        Figure('its error at constant speed', max(constant), '1/s'),
+        Figure('error of speed variation at constant speed', max(constant), '1/s'),
         Figure('its change with twice the elements', max(refined), '1/s'),
     ]
 
@@ -182,14 +151,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     imported = import_time(min(options.repeats, 5))
     figures = [
         Figure('import of lathe_chatter.stability beyond NumPy', 1e3 * imported, 'ms'),
-        *roots(options.repeats),
-        *limits(options.repeats),
+        *stability_figures(options.repeats),
+        *errors_of_roots(),
+        *errors_of_limits(),
         *advice(options.machines),
-        *variation(options.repeats),
+        *errors_of_variation(),
     ]
     if options.json:
         print(json.dumps([asdict(figure) for figure in figures], indent=2))
         return 0
+    print(this_machine())
     width = max(len(figure.name) for figure in figures)
     for figure in figures:
         print(f'{figure.name:<{width}}  {figure.value:>10.4g} {figure.unit}')

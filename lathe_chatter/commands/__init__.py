@@ -8,7 +8,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Protocol
 
-from lathe_chatter.commands import export, knock_map, lobes, recover, report, reproduce, run, verify
+from lathe_chatter.commands import bench, export, knock_map, lobes, recover, report, reproduce, run, verify
 
 
 class Verb(Protocol):
@@ -25,4 +25,4 @@ class Verb(Protocol):
         """Do it and return the exit code."""
 
 
-VERBS: tuple[Verb, ...] = (run, report, reproduce, lobes, knock_map, verify, recover, export)
+VERBS: tuple[Verb, ...] = (run, report, reproduce, lobes, knock_map, verify, recover, export, bench)
