@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from dataclasses import asdict
 
@@ -11,6 +10,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from lathe_chatter.commands.output import print_json
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.warm_up import warm_up
 
@@ -61,6 +61,5 @@ def run(options: Namespace) -> int:
     console.print('CPU time in one thread. The scripts of benchmarks/ in the source measure more.')
     if options.json:
         values = {topic: [asdict(f) for f in figures] for topic, figures in found.items()}
-        text = json.dumps({'machine': this_machine(), 'figures': values})
-        Console(highlight=False, soft_wrap=True).print(text)
+        print_json({'machine': this_machine(), 'figures': values})
     return 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -19,6 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from lathe_chatter.commands.output import print_json
 from lathe_chatter.commands.parameter_options import add_parameter_options, start_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockMap, Margin, run_knock_map
@@ -111,7 +111,7 @@ def run(options: Namespace) -> int:
     _show(knocks, console)
     console.print(f'points   {options.output}\npicture  {picture}', soft_wrap=True)
     if options.json:
-        Console(highlight=False, soft_wrap=True).print(json.dumps(_figures(knocks)))
+        print_json(_figures(knocks))
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from lathe_chatter.commands.output import print_json
 from lathe_chatter.commands.parameter_options import add_parameter_options, start_of
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Array, BearingContact
@@ -90,8 +90,7 @@ def run(options: Namespace) -> int:
     _show(start, limits, console)
     console.print(f'picture  {options.output}', soft_wrap=True)
     if options.json:
-        text = json.dumps(_figures(start, limits, growth))
-        Console(highlight=False, soft_wrap=True).print(text)
+        print_json(_figures(start, limits, growth))
     return 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -13,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lathe_chatter.changes import on_the_shop_floor
+from lathe_chatter.commands.output import print_json
 from lathe_chatter.history import History, read_history
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.moments import Moment, moments_of
@@ -40,7 +40,7 @@ def run(options: Namespace) -> int:
         read_history(options.run_path), Console(stderr=options.json, highlight=False)
     )
     if options.json:
-        Console(highlight=False, soft_wrap=True).print(json.dumps(figures))
+        print_json(figures)
     return 0
 
 
@@ -85,8 +85,8 @@ def _moment_figures(moment: Moment) -> dict[str, Any]:
         'tool_peak_to_peak': _known(moment.size('tool_displacement')),
         'workpiece_peak_to_peak': _known(moment.size('workpiece_displacement')),
         'frequency': spectrum.peak if moved else None,
-        'out_of_cut': moment.out_of_cut,
-        'on_bearing': moment.on_bearing,
+        'out_of_cut': _known(moment.out_of_cut),
+        'on_bearing': _known(moment.on_bearing),
     }
 
 

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from lathe_chatter.commands.output import print_json
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
 from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
@@ -69,7 +70,7 @@ def run(options: Namespace) -> int:
     _show(results, findings, console)
     console.print(f'page     {page}\nfigures  {folder / FIGURES}', soft_wrap=True)
     if options.json:
-        Console(highlight=False, soft_wrap=True).print(text)
+        print_json(figures)
     return 0 if all(result.agrees for result in results) else 1
 
 
