@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.changes import Change
+from lathe_chatter.changes import Change, Knock
 from lathe_chatter.lathe_parameters import cut_from, machine_from
 from lathe_chatter.model import Array, Cut, Machine
 from lathe_chatter.recording import Run, read_run
@@ -52,6 +52,7 @@ class History:
         start: The cut at the start.
         samples: By name of column (n,), SI.
         changes: Of the cut, in order.
+        knocks: On the tool, in order.
         flags: Of the monitor, in order.
         estimates: Growth rate, frequency and so on by name: simulated times and values (2, m).
         tool_leaves_cut: The force law, see `VirtualLathe`.
@@ -62,6 +63,7 @@ class History:
     start: Cut
     samples: dict[str, Array]
     changes: list[Change] = field(default_factory=list)
+    knocks: list[Knock] = field(default_factory=list)
     flags: list[Flag] = field(default_factory=list)
     estimates: dict[str, Array] = field(default_factory=dict)
     tool_leaves_cut: bool = True
@@ -112,6 +114,7 @@ def read_history(path: Path) -> History:
         start=cut_from(told.parameters),
         samples=samples.columns,
         changes=list(told.changes),
+        knocks=[each for act in told.acts for each in act.happenings if isinstance(each, Knock)],
         flags=_flags(run, samples, estimates),
         estimates=estimates,
         tool_leaves_cut=bool(told.parameters.get('tool_leaves_cut', True)),

@@ -11,6 +11,7 @@ from dataclasses import fields
 from enum import Enum
 from typing import Any
 
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine, Mode
 
@@ -39,7 +40,11 @@ def machine_from(values: Mapping[str, Any]) -> Machine:
     def mode(part: str) -> Mode:
         default = getattr(usual, part)
         names = [entry.name for entry in fields(Mode)]
-        return Mode(**{n: values.get(f'{part}.{n}', getattr(default, n)) for n in names})
+        try:
+            return Mode(**{n: values.get(f'{part}.{n}', getattr(default, n)) for n in names})
+        except ParameterError as error:
+            name = f'{part}.{error.name}'
+            raise ParameterError(name, error.value, error.unit, error.allowed) from None
 
     given = {name: values[name] for name in _PLAIN if name in values}
     return Machine(tool=mode('tool'), workpiece=mode('workpiece'), **given)

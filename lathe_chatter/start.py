@@ -13,6 +13,7 @@ from typing import Any
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe_parameters import cut_from, machine_from, parameters_of
 from lathe_chatter.lathe_setup import SEED, LatheSetup
 from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.quantities import Quantity, quantity_of
@@ -47,15 +48,7 @@ class Start:
 
     def parameters(self) -> dict[str, Any]:
         """Every parameter by its name, as `start_from` takes them."""
-        found: dict[str, Any] = {}
-        for entry in fields(Cut):
-            value = getattr(self.cut, entry.name)
-            found[entry.name] = getattr(value, 'value', value)
-        for mode in _MODES:
-            part = getattr(self.machine, mode)
-            found |= {f'{mode}.{e.name}': getattr(part, e.name) for e in fields(Mode)}
-        found |= {name: getattr(self.machine, name) for name in _MACHINE}
-        return found | {name: getattr(self.setup, name) for name in _OWN}
+        return parameters_of(self.lathe())
 
 
 def parameter_names() -> Iterator[tuple[str, Quantity | None]]:
@@ -88,32 +81,4 @@ def start_from(values: Mapping[str, Any]) -> Start:
     seed = own.get('seed')
     if isinstance(seed, float) and seed.is_integer():
         own['seed'] = int(seed)
-    return Start(
-        LatheSetup(machine_from(values), **own),
-        Cut(**{e.name: values[e.name] for e in fields(Cut) if e.name in values}),
-    )
-
-
-def machine_from(values: Mapping[str, Any]) -> Machine:
-    """The machine among parameters by name; other names are passed over.
-
-    Raises:
-        ParameterError: If a value is not allowed.
-    """
-    usual = Machine()
-
-    def mode(part: str) -> Mode:
-        own = getattr(usual, part)
-        names = [entry.name for entry in fields(Mode)]
-        try:
-            return Mode(**{n: values.get(f'{part}.{n}', getattr(own, n)) for n in names})
-        except ParameterError as error:
-            raise ParameterError(
-                f'{part}.{error.name}', error.value, error.unit, error.allowed
-            ) from None
-
-    return Machine(
-        tool=mode('tool'),
-        workpiece=mode('workpiece'),
-        **{name: values[name] for name in _MACHINE if name in values},
-    )
+    return Start(LatheSetup(machine_from(values), **own), cut_from(values))

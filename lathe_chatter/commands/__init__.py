@@ -8,7 +8,18 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Protocol
 
-from lathe_chatter.commands import bench, export, knock_map, lobes, recover, report, reproduce, run, verify
+from lathe_chatter.commands import (
+    bench,
+    export,
+    knock_map,
+    lobes,
+    recover,
+    report,
+    reproduce,
+    run,
+    simulate,
+    verify,
+)
 
 
 class Verb(Protocol):
@@ -25,4 +36,15 @@ class Verb(Protocol):
         """Do it and return the exit code."""
 
 
-VERBS: tuple[Verb, ...] = (run, report, reproduce, lobes, knock_map, verify, recover, export, bench)
+VERBS: tuple[Verb, ...] = (
+    run,
+    simulate,
+    report,
+    reproduce,
+    lobes,
+    knock_map,
+    verify,
+    recover,
+    export,
+    bench,
+)

@@ -104,6 +104,10 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
     for change in history.changes:
         words = ', '.join(on_the_shop_floor(*changed) for changed in change.new.items())
         result.append(_entry(history, change.time, words))
+    result += [
+        _entry(history, knock.time, f'knock, {knock.impulse * 1e3:g} mN s')
+        for knock in history.knocks
+    ]
     for flag in history.flags:
         entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
         if flag.chatter:

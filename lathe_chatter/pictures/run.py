@@ -16,6 +16,7 @@ from lathe_chatter.pictures.path import bearings_of, draw_path
 from lathe_chatter.pictures.style import (
     ALARM,
     ALARM_TEXT,
+    KNOCK,
     NEUTRAL,
     TOOL,
     WORKPIECE,
@@ -119,7 +120,9 @@ def _draw_rates(axes: Axes, history: History) -> None:
 
 
 def _mark(axes: Axes, history: History) -> None:
-    """Parameter changes as lines, the raised flag as a shade."""
+    """Parameter changes and knocks as lines, the raised flag as a shade."""
+    for knock in history.knocks:
+        axes.axvline(knock.time, color=KNOCK, lw=0.9, ls='-.')
     for change in history.changes:
         axes.axvline(change.time, color='k', lw=0.9, ls=':')
     for start, end in history.chatter_spans():
@@ -129,14 +132,18 @@ def _mark(axes: Axes, history: History) -> None:
 def _label_changes(axes: Axes, history: History) -> None:
     """Say above the plot what changed, and where the flag was up."""
     last, height = -history.duration, 4
-    for change in history.changes:
-        text = '\n'.join(on_the_shop_floor(name, value) for name, value in change.new.items())
+    labels = [
+        (change.time, '\n'.join(on_the_shop_floor(*entry) for entry in change.new.items()))
+        for change in history.changes
+    ]
+    labels += [(knock.time, f'knock {knock.impulse * 1e3:g} mN s') for knock in history.knocks]
+    for time, text in sorted(labels):
         # One that would run into the one before stands above it.
-        near = change.time - last < _LABEL_WIDTH * history.duration
+        near = time - last < _LABEL_WIDTH * history.duration
         height = height + 12 * (text.count('\n') + 1) if near else 4
-        last = change.time
+        last = time
         axes.annotate(
-            text, (change.time, 1.0), (3, height), xycoords=('data', 'axes fraction'),
+            text, (time, 1.0), (3, height), xycoords=('data', 'axes fraction'),
             textcoords='offset points', fontsize=9, va='bottom',
         )  # fmt: skip
     spans = history.chatter_spans()

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 TOOL, WORKPIECE, ALARM, NEUTRAL = '#0072B2', '#D55E00', '#CC79A7', '#555555'
 ALARM_TEXT = '#8a3c66'
 """The same, dark enough to be read."""
+KNOCK = '#8A6D00'
 OPEN, SEATED, LINE, SAFE = '#0072B2', '#D55E00', '#000000', '#009E73'
 _PREFIXES = {-4: 'p', -3: 'n', -2: 'µ', -1: 'm', 0: '', 1: 'k', 2: 'M', 3: 'G', 4: 'T'}
 _BINS = 1500
