@@ -103,26 +103,30 @@ class Moment:
 
 
 def moments_of(history: History) -> list[Moment]:
-    """Up to three moments worth a closer look: before the first change, chatter, the end."""
+    """Two or three moments worth a closer look: before anything happened, chatter, the end."""
     end = history.duration
-    first = history.changes[0].time if history.changes else end
-    wanted = [('before the first change' if history.changes else 'at the end', first)]
+    happenings = _happenings(history)
+    first = happenings[0] if happenings else min(_PORTRAIT, end)
+    wanted = [('before the first change' if happenings else 'at the start', first)]
     spans = history.chatter_spans()
     if spans:
         start, stop = spans[0]
-        inside = [change.time for change in history.changes if start < change.time < stop]
+        inside = [time for time in happenings if start < time < stop]
         wanted.append(('chatter', inside[0] if inside else stop))
     if end > wanted[-1][1]:
         wanted.append(('at the end', end))
     return [_moment(history, title, until) for title, until in wanted]
 
 
+def _happenings(history: History) -> list[float]:
+    """When the cut was changed or knocked, s."""
+    times = [change.time for change in history.changes] + [k.time for k in history.knocks]
+    return sorted(time for time in times if 0.0 < time <= history.duration)
+
+
 def _moment(history: History, title: str, until: float) -> Moment:
-    """The samples before an instant, back to the change before it."""
-    since = max(
-        (change.time for change in history.changes if change.time < until - 1e-9),
-        default=0.0,
-    )
+    """The samples before an instant, back to what happened before it."""
+    since = max((time for time in _happenings(history) if time < until - 1e-9), default=0.0)
     since = max(since, until - _LONGEST)
     time = history.samples['time']
     inside = (time > since) & (time <= until)

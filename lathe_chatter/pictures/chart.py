@@ -112,8 +112,14 @@ def draw_limits(
 
     if shade:
         axes.fill_between(
-            speeds, 0.0, shown(limits.depth_of_cut), color=SAFE, alpha=0.16, lw=0, label='safe'
-        )
+            speeds,
+            0.0,
+            shown(limits.depth_of_cut),
+            color=SAFE,
+            alpha=0.16,
+            lw=0,
+            label='small disturbances die out',
+        )  # fmt: skip
     if contact is not BearingContact.SEATED:
         axes.plot(speeds, shown(limits.open_limit), color=OPEN, lw=1.3, label='limit, open')
     if contact is not BearingContact.NONE:

@@ -20,15 +20,16 @@ def test_a_knocked_cut_is_simulated_and_reported(
     run = tmp_path / 'run'
     call = [
         'simulate', '--output', str(run), '--depth-of-cut', '0.00065',
-        '--bearing-clearance', '1e-5', '--duration', '6', '--knock', '3:0.002', '--json',
+        '--bearing-clearance', '1e-5', '--duration', '9', '--knock', '6:0.002', '--json',
     ]  # fmt: skip
     assert cli.main(call) == 0
     simulated = json.loads(capsys.readouterr().out)
-    assert simulated['samples'] == 60_000
+    assert simulated['samples'] == 90_000
     assert cli.main(['report', str(run), '--json']) == 0
     figures = json.loads(capsys.readouterr().out)
     assert [entry['what'] for entry in figures['occurrences']][1] == 'knock, 2 mN s'
-    (moment,) = figures['moments']
+    before, moment = figures['moments']
+    assert before['tool_peak_to_peak'] < 0.1 * moment['tool_peak_to_peak']
     assert moment['tool_peak_to_peak'] == pytest.approx(41.9e-6, abs=0.1e-6)
     assert 0.0 < moment['on_bearing'] < 1.0
     assert 120.0 < moment['frequency'] < 140.0
