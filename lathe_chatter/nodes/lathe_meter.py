@@ -51,6 +51,11 @@ class LatheMeter:
         """Note by how much a tick came late, ns."""
         self._lateness.add(lateness)
 
+    @property
+    def behind(self) -> bool:
+        """Whether simulated time was given up in this second."""
+        return self._pacer.overruns > self._before.overruns
+
     def begin_second(self) -> None:
         """Forget what belonged to the second that was reported."""
         now = time.monotonic_ns()
@@ -59,17 +64,18 @@ class LatheMeter:
         self._lateness.clear()
         self._engaged = self._in_cut = 0
 
-    def pace(self, control: RunControl, *, asked: float, clock: str) -> Status:
+    def pace(self, control: RunControl, *, asked: float, clock: str, scheduling: str) -> Status:
         """The status of the pace.
 
         Args:
             control: Whether time goes on.
             asked: The real-time factor asked for, 0 for as fast as possible.
             clock: What is wrong with /clock; empty if nothing is.
+            scheduling: Of the thread that ticks.
         """
         elapsed = max(1, time.monotonic_ns() - self._before.at)
         reached = (self.ticks - self._before.ticks) * self._tick / elapsed
-        behind = self._pacer.overruns > self._before.overruns
+        behind = self.behind
         message = 'as fast as possible' if asked == 0.0 else 'keeping up'
         if control.state is not RunState.RUNNING:
             message = control.state.value
@@ -89,6 +95,7 @@ class LatheMeter:
             'step time max, us': largest,
             'lateness p99, us': late99,
             'lateness max, us': latest,
+            'scheduling': scheduling,
         }
         return Status('pace', WARN if behind or clock else OK, clock or message, values)
 

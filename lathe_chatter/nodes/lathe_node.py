@@ -26,7 +26,8 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_table import Value
 from lathe_chatter.nodes.parameters import CUT_ROWS, LATHE, samples_per_tick
 from lathe_chatter.nodes.running import run_node
-from lathe_chatter.nodes.scheduling import ask_for_short_slices
+from lathe_chatter.nodes.scheduling import RealTime, ask_for_short_slices
+from lathe_chatter.nodes.tick_loop import spin_in_ticks
 from lathe_chatter.warm_up import warm_up
 
 _BUDGET = 5_000_000
@@ -35,24 +36,30 @@ _READERS_PATIENCE = 0.1
 """s that it then waits at most for its slowest reader; in real time it waits for nobody."""
 
 
+_LOOK_FOR_READERS = 5_000_000
+"""ns from one look to the next for the readers that it waits for."""
+
+
 class LatheNode(ParameterNode):
     """Integrates a `VirtualLathe` tick by tick and publishes what it does.
 
-    A timer wakes the node at the rate of the ticks; how many ticks it then makes follows from
-    the clock: none while paused, one as a rule, several after a delay or at a real-time factor
-    above 1. Under `use_sim_time` that clock is /clock, and all of its time is cut.
+    It is woken at the rate of the ticks; how many ticks it then makes follows from the clock:
+    none while paused, one as a rule, several after a delay or at a real-time factor above 1.
+    Under `use_sim_time` that clock is /clock, and all of its time is cut.
 
     Topics, services and parameters are those of the README. A parameter set takes effect
     between two samples, all of an atomic set at the same one.
 
     Args:
+        by_timer: Whether a timer wakes it, so that any executor will do; else its loop calls
+            `wake` (tick_loop.py). Under `use_sim_time` there is a timer in any case.
         options: As for `rclpy.node.Node`.
 
     Raises:
         ParameterError: If a parameter given at the start is not allowed.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, by_timer: bool = True, **options: Any) -> None:
         """Compile the inner loop, then begin to cut."""
         super().__init__('lathe', LATHE, **options)
         values: Mapping[str, Any] = self.values
@@ -76,6 +83,7 @@ class LatheNode(ParameterNode):
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
         self._meter = LatheMeter(self._pacer, tick)
+        self._real_time = RealTime(values['realtime_priority'])
         self._topics = LatheTopics(
             self, values['tick_rate'], publish_clock=values['publish_clock']
         )
@@ -83,7 +91,9 @@ class LatheNode(ParameterNode):
         self._create_services()
         self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=10))
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / values['tick_rate'], self._wake, clock=steady)
+        self._by_timer = by_timer or self._follows
+        if self._by_timer:
+            self.create_timer(1.0 / values['tick_rate'], self.wake, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
         if self._awaited:
             self.get_logger().info(f'Waiting for {self._awaited} readers of my samples.')
@@ -113,7 +123,20 @@ class LatheNode(ParameterNode):
         since_start = nanoseconds(self._lathe.samples_taken, self._sample_rate)
         return self._stamp_of_zero + since_start
 
-    def _wake(self) -> None:
+    def next_wake(self) -> int | None:
+        """When it should be woken, ns of time.monotonic_ns(); None where nothing is to be done."""
+        if self._by_timer:
+            return None
+        now = time.monotonic_ns()
+        if self._awaited:
+            return now + _LOOK_FOR_READERS
+        if self._control.state is not RunState.RUNNING:
+            return None
+        if self._free or self._pacer.must_start(now):
+            return now
+        return self._pacer.next_wake(now)
+
+    def wake(self) -> None:
         """Make the ticks that are due."""
         if self._awaited and self._topics.readers() >= self._awaited:
             self.announce()  # those who read samples may read events too
@@ -140,6 +163,11 @@ class LatheNode(ParameterNode):
                 throttle_duration_sec=10.0,
             )
             self._diagnostics.publish_changes(self._statuses())
+
+    def keep_place(self) -> None:
+        """Be scheduled in real time only while that disturbs nobody: with cores to spare."""
+        running = self._control.state is RunState.RUNNING and not self._free
+        self._real_time.hold(wanted=running and self._factor <= 1.0 and not self._meter.behind)
 
     def _tick(self) -> None:
         """Cut one tick and publish it."""
@@ -269,7 +297,12 @@ class LatheNode(ParameterNode):
 
     def _statuses(self) -> list[Status]:
         return [
-            self._meter.pace(self._control, asked=self._factor, clock=self._clock_complaint()),
+            self._meter.pace(
+                self._control,
+                asked=self._factor,
+                clock=self._clock_complaint(),
+                scheduling=self._real_time.word,
+            ),
             self._meter.cutting(self._control, self._lathe),
             *self._record.statuses(),
         ]
@@ -287,7 +320,7 @@ class LatheNode(ParameterNode):
 def main() -> None:
     """Run the node until it is told to end."""
     ask_for_short_slices()
-    run_node(LatheNode)
+    run_node(lambda: LatheNode(by_timer=False), spin=spin_in_ticks)
 
 
 if __name__ == '__main__':

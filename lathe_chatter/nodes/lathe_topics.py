@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
-from lathe_chatter.nodes.messages import joint_states, refill, samples_to_message, time_message
+from lathe_chatter.nodes.messages import Wire, joint_states, time_message
 
 _SCALARS = {
     '~/tool/displacement': SAMPLE_COLUMNS.index('tool_displacement'),
@@ -52,15 +52,15 @@ class LatheTopics:
         deep = max(10, round(_HISTORY * tick_rate))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._samples = publisher(Float64MultiArray, '~/samples', kept)
-        self._block, self._rows = Float64MultiArray(), 0
+        self._wire = Wire()
         self._scalars = [
-            (publisher(Float64, topic, QoSProfile(depth=deep)), Float64(), column)
+            (publisher(Float64, topic, QoSProfile(depth=deep)), column)
             for topic, column in _SCALARS.items()
         ]
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
         self._looked_around = -_LOOK_AROUND
-        self._heard_scalars: list[tuple[Publisher, Float64, int]] = []
+        self._heard_scalars: list[tuple[Publisher, int]] = []
         self._heard_joints = False
 
     def publish(self, samples: Array, stamp: int) -> None:
@@ -70,16 +70,11 @@ class LatheTopics:
             samples: (n, 8), n > 0.
             stamp: Simulated time of the last, ns.
         """
-        if len(samples) == self._rows:  # as always but at the end of a run
-            refill(self._block, samples)
-        else:
-            self._block, self._rows = samples_to_message(samples), len(samples)
-        self._samples.publish(self._block)
+        self._samples.publish(self._wire.block(samples))
         self._look_around()
         last = samples[-1]
-        for publisher, message, column in self._heard_scalars:
-            message.data = float(last[column])
-            publisher.publish(message)
+        for publisher, column in self._heard_scalars:
+            publisher.publish(self._wire.number(last[column]))
         if self._heard_joints:
             self._joints.publish(joint_states(last, stamp))
         self.publish_clock(stamp)

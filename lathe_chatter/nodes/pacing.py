@@ -76,6 +76,15 @@ class Pacer:
         self._done += ticks
         return ticks
 
+    def next_wake(self, now: int) -> int:
+        """When to call next: when the next tick is due, but no sooner than after a tick's time.
+
+        At a factor above 1 several ticks are made in one go.
+        """
+        if self.factor > 1.0:
+            return now + int(self.tick)
+        return now - int(self.lateness(now) - self.period)
+
     def lateness(self, now: int) -> float:
         """How long ago the last tick that was made had been due, ns; negative if it is early."""
         return 0.0 if self._origin is None else now - self._origin - self._done * self.period

@@ -80,6 +80,12 @@ LATHE = ParameterTable(
         Row('seed', 0, SEED.meaning, SEED),
         Row('publish_clock', default=False, meaning='whether this node drives /clock'),
         Row(
+            'realtime_priority',
+            1,
+            'priority (SCHED_RR) to ask for, where permitted, while it keeps real time; 0: none',
+            Quantity('', high=99.0),
+        ),
+        Row(
             'await_readers',
             0,
             'readers of ~/samples that the first tick waits for, unless ~/pause says otherwise',

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from types import FrameType
+from typing import TypeVar
 
 import rclpy
 from rclpy.duration import Duration
@@ -23,7 +24,11 @@ try:
 except ImportError:  # an rclpy older than the executor
     EventsExecutor = None
 
-_LOOK_UP = 0.1
+_Node = TypeVar('_Node', bound=Node)
+Spin = Callable[[Executor, _Node, Callable[[], bool]], None]
+"""Serves a node with an executor until a function says that it is told to end."""
+
+LOOK_UP = 0.1
 """s after which a node that nothing happens to looks whether it was told to end."""
 
 _DELIVERY = 2.0
@@ -63,7 +68,11 @@ class _EndSignal:
 
 
 def run_node(
-    make: Callable[[], Node], args: list[str] | None = None, *, by_events: bool = True
+    make: Callable[[], _Node],
+    args: list[str] | None = None,
+    *,
+    by_events: bool = True,
+    spin: Spin[_Node] | None = None,
 ) -> None:
     """Make a node and spin it until SIGINT, SIGTERM or a shutdown of its context.
 
@@ -73,17 +82,18 @@ def run_node(
         make: Makes the node once rclpy is initialised.
         args: Command-line arguments, those of the process by default.
         by_events: Whether the executor may be the one driven by events; see `make_executor`.
+        spin: How the node is served until it is told to end; by default as `serve` does.
 
     Raises:
         SystemExit: With 2 and a sentence on stderr if the node cannot start as it was asked to.
     """
     end = _EndSignal()
-    node: Node | None = None
+    node: _Node | None = None
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         end.wait()
-        spin(make_executor(node, by_events=by_events), node, lambda: end.came)
+        (spin or serve)(make_executor(node, by_events=by_events), node, lambda: end.came)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except _START_ERRORS as error:
@@ -106,12 +116,12 @@ def _deliver(node: Node) -> None:
         publisher.wait_for_all_acked(Duration(seconds=left))
 
 
-def spin(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:
+def serve(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:
     """Serve a node until `ended` says so or its context is shut down."""
     executor.add_node(node)
     try:
         while node.context.ok() and not ended():
-            executor.spin_once(timeout_sec=_LOOK_UP)
+            executor.spin_once(timeout_sec=LOOK_UP)
     finally:
         executor.remove_node(node)
         executor.shutdown()

@@ -311,7 +311,9 @@ def test_the_guard_ends_the_run_and_a_reset_begins_another(
     core = VirtualLathe(cut=Cut(depth_of_cut=0.01), tool_leaves_cut=False)
     expected = core.advance(10**6)
     assert core.guard
-    bench.spin_until(lambda: len(blocks(messages)) >= len(expected), 'the last sample')
+    bench.spin_until(
+        lambda: messages and len(blocks(messages)) >= len(expected), 'the last sample'
+    )
     assert blocks(messages).tobytes() == expected.tobytes()
     assert np.isfinite(blocks(messages)).all()
     assert bench.pause('/lathe').message.endswith('Only a reset helps.')

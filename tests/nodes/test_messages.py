@@ -8,11 +8,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.nodes.messages import (
+    Wire,
     joint_states,
     nanoseconds,
     samples_from_message,
@@ -33,6 +34,16 @@ def test_a_block_survives_the_wire_bit_for_bit(rows: int) -> None:
     assert columns == SAMPLE_COLUMNS
     assert back.shape == (rows, 8)
     assert back.tobytes() == samples.tobytes()
+
+
+def test_ready_made_bytes_are_the_message() -> None:
+    wire = Wire()
+    for rows in (20, 20, 7, 0, 1000):  # not compared as bytes: padding is left as it was found
+        samples = block(rows, 8, seed=rows)
+        message = deserialize_message(wire.block(samples), Float64MultiArray)
+        assert message == samples_to_message(samples)
+    for value in (0.0, -1.5e-300, float('inf')):
+        assert deserialize_message(wire.number(value), Float64) == Float64(data=value)
 
 
 def test_the_layout_is_that_of_the_contract() -> None:

@@ -1,0 +1,61 @@
+"""The loop that wakes the lathe: ticks by the clock, and requests served between them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from bench import messages_of
+from rcl_interfaces.srv import SetParameters
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
+
+from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.nodes.running import make_executor
+from lathe_chatter.nodes.tick_loop import spin_in_ticks
+
+PATIENCE = 60.0
+
+
+@pytest.fixture
+def lathe(context: Context) -> Iterator[LatheNode]:
+    # Its own priority: the test is no process of its own.
+    overrides = [Parameter('realtime_priority', value=0)]
+    node = LatheNode(context=context, by_timer=False, parameter_overrides=overrides)
+    yield node
+    node.destroy_node()
+
+
+def spin_until(node: LatheNode, predicate: Any) -> None:
+    end = time.monotonic() + PATIENCE
+    spin_in_ticks(make_executor(node), node, lambda: predicate() or time.monotonic() > end)
+    assert predicate()
+
+
+def test_it_ticks_by_the_clock(lathe: LatheNode) -> None:
+    began = time.monotonic()
+    spin_until(lathe, lambda: lathe.samples_taken >= 3000)
+    # Never ahead of the clock, but for the half period that counts as in time.
+    assert lathe.samples_taken / 1e4 <= time.monotonic() - began + 0.001
+
+
+@pytest.mark.parametrize('factor', [0.0, 0.5, 1.0, 10.0])
+def test_requests_are_served_between_ticks_and_in_a_pause(lathe: LatheNode, factor: float) -> None:
+    # The node is its own client: one thread serves both.
+    set_parameters = lathe.create_client(SetParameters, '~/set_parameters')
+    pause = lathe.create_client(SetBool, '~/pause')
+    spin_until(lathe, lambda: set_parameters.service_is_ready() and pause.service_is_ready())
+    request = SetParameters.Request(parameters=messages_of({'real_time_factor': factor}))
+    answer = set_parameters.call_async(request)
+    spin_until(lathe, answer.done)
+    now = lathe.samples_taken
+    spin_until(lathe, lambda: lathe.samples_taken > now + 100)
+    paused = pause.call_async(SetBool.Request(data=True))
+    spin_until(lathe, paused.done)
+    now = lathe.samples_taken
+    resumed = pause.call_async(SetBool.Request(data=False))
+    spin_until(lathe, resumed.done)
+    spin_until(lathe, lambda: lathe.samples_taken > now)
