@@ -44,8 +44,9 @@ CONTRACT = {
 }
 
 
-def test_the_table_is_the_contract() -> None:
-    assert {row.name: (row.default, row.unit, row.run_time) for row in LATHE} == CONTRACT
+def test_the_table_keeps_the_contract() -> None:
+    table = {row.name: (row.default, row.unit, row.run_time) for row in LATHE}
+    assert {name: table.get(name) for name in CONTRACT} == CONTRACT
 
 
 @pytest.mark.parametrize('row', [*LATHE, *MONITOR], ids=lambda row: row.name)
@@ -148,7 +149,7 @@ def test_an_unknown_name_is_told_its_nearest() -> None:
 
 def test_the_table_of_a_readme_has_every_row() -> None:
     lines = LATHE.markdown().splitlines()
-    assert len(lines) == 2 + len(CONTRACT)
+    assert len(lines) == 2 + len(list(LATHE))
     assert len({line.count('|') for line in lines}) == 1
     assert (
         '| `depth_of_cut` | 0.0005 | m | a finite number from 0 to 0.01 m | run time '
