@@ -12,7 +12,7 @@ from struct import pack
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
@@ -98,6 +98,37 @@ def samples_from_message(message: Float64MultiArray) -> tuple[Array, tuple[str, 
             f'do not make {stored} numbers.'
         )
     return np.frombuffer(message.data, float)[offset:].reshape(rows, width), columns
+
+
+class BlockReader:
+    """Reads blocks of samples from the bytes that DDS carries.
+
+    Nothing before the doubles changes from block to block of one lathe: where it is as it was
+    in the block before, it need not be parsed again.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing known."""
+        self._head, self._size = b'', 0
+        self._shape = (0, 0)
+        self._columns: tuple[str, ...] = ()
+
+    def read(self, data: bytes) -> tuple[Array, tuple[str, ...]]:
+        """The samples (n, k) of a serialised block, read-only, and the names of its k columns.
+
+        Raises:
+            LayoutError: If it is no block of samples.
+        """
+        head = len(self._head)
+        if head and len(data) == self._size and data.startswith(self._head):
+            return np.frombuffer(data, float, offset=head).reshape(self._shape), self._columns
+        message = deserialize_message(data, Float64MultiArray)
+        samples, columns = samples_from_message(message)
+        head = len(data) - samples.nbytes
+        if samples.size and data[head:] == samples.tobytes():  # in the order of this machine
+            self._head, self._size = data[:head], len(data)
+            self._shape, self._columns = (samples.shape[0], samples.shape[1]), columns
+        return samples, columns
 
 
 def nanoseconds(samples_taken: int, sample_rate: float) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from lathe_chatter.errors import LatheChatterError, LayoutError
 from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.model import Array
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from lathe_chatter.nodes.messages import samples_from_message
+from lathe_chatter.nodes.messages import BlockReader
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR
 from lathe_chatter.nodes.running import run_node
@@ -27,6 +27,10 @@ from lathe_chatter.warm_up import warm_up
 
 _BACKLOG = 2000
 """Blocks of samples that may wait for the monitor: 4 s of a lathe of 500 ticks a second."""
+_AT_ONCE = 200
+"""Samples that the detector gets at once, if they wait: 20 ms of a lathe of 10 kHz."""
+_REST = 0.01
+"""s that the node lets samples come in before it looks at them together."""
 _REPORT_PERIOD = 0.02
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
 _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
@@ -69,30 +73,71 @@ class MonitorNode(ParameterNode):
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))
         self._state_publisher.publish(String(data=self._state))
-        self.create_subscription(
+        self._reader = BlockReader()
+        self._subscription = self.create_subscription(
             Float64MultiArray,
             'lathe/samples',
             self._on_samples,
             QoSProfile(depth=_BACKLOG),
+            raw=True,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     # -- listening -------------------------------------------------------------------------
 
-    def _on_samples(self, message: Float64MultiArray) -> None:
-        try:
-            samples, columns = samples_from_message(message)
-            if not len(samples):
+    def _on_samples(self, data: bytes) -> None:
+        """Take this block and at once those that wait behind it."""
+        blocks: list[Array] = []
+        names: tuple[str, ...] = ()
+        count = 0
+        for serialised in self._waiting(data):
+            try:
+                samples, columns = self._reader.read(serialised)
+            except LatheChatterError as error:
+                self._complain(error)
+                continue
+            if columns != names or count >= _AT_ONCE:
+                self._take_all(blocks, names)
+                blocks, names, count = [], columns, 0
+            if len(samples):
+                blocks.append(samples)
+                count += len(samples)
+        self._take_all(blocks, names)
+
+    def _waiting(self, first: bytes) -> Iterator[bytes]:
+        """A serialised message and those that have come since, but no more than may wait."""
+        yield first
+        handle = self._subscription.handle
+        for _ in range(_BACKLOG):
+            with handle:
+                found = handle.take_message(Float64MultiArray, True)  # noqa: FBT003 -- raw
+            if found is None:
                 return
+            yield found[0]
+
+    def _take_all(self, blocks: list[Array], columns: tuple[str, ...]) -> None:
+        """Take blocks together where they follow each other evenly, else one by one."""
+        if not blocks:
+            return
+        joined = np.concatenate(blocks)
+        even = 'time' in columns and _even(joined[:, columns.index('time')])
+        for samples in [joined] if even else blocks:
+            self._take(samples, columns)
+
+    def _take(self, samples: Array, columns: tuple[str, ...]) -> None:
+        try:
             self._follow(_times(samples, columns))
             estimate = self._detector.update(samples, columns)
         except LatheChatterError as error:
-            self._complaint = str(error)
-            self.get_logger().error(self._complaint, throttle_duration_sec=10.0)
+            self._complain(error)
             return
         self._complaint = ''
         self._tell(estimate)
+
+    def _complain(self, error: LatheChatterError) -> None:
+        self._complaint = str(error)
+        self.get_logger().error(self._complaint, throttle_duration_sec=10.0)
 
     def _follow(self, times: Array) -> None:
         """Notice lost samples and a lathe that has started again."""
@@ -201,6 +246,12 @@ def _times(samples: Array, columns: Sequence[str]) -> Array:
     return times
 
 
+def _even(times: Array) -> bool:
+    """Whether times (n,) follow each other without a gap or a jump back."""
+    steps = np.diff(times)
+    return steps.size == 0 or bool(0.0 < steps.max() < 1.5 * steps.min())
+
+
 def _onset(estimate: Estimate) -> str:
     """What a machinist has to know, as far as it is known."""
     known = [
@@ -219,7 +270,7 @@ def _clearance(estimate: Estimate) -> str:
 
 def main() -> None:
     """Run the node until it is told to end."""
-    run_node(MonitorNode)
+    run_node(MonitorNode, by_events=False, rest=_REST)
 
 
 if __name__ == '__main__':

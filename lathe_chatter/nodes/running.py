@@ -73,6 +73,7 @@ def run_node(
     *,
     by_events: bool = True,
     spin: Spin[_Node] | None = None,
+    rest: float = 0.0,
 ) -> None:
     """Make a node and spin it until SIGINT, SIGTERM or a shutdown of its context.
 
@@ -83,6 +84,7 @@ def run_node(
         args: Command-line arguments, those of the process by default.
         by_events: Whether the executor may be the one driven by events; see `make_executor`.
         spin: How the node is served until it is told to end; by default as `serve` does.
+        rest: For `serve`.
 
     Raises:
         SystemExit: With 2 and a sentence on stderr if the node cannot start as it was asked to.
@@ -93,7 +95,11 @@ def run_node(
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         end.wait()
-        (spin or serve)(make_executor(node, by_events=by_events), node, lambda: end.came)
+        executor = make_executor(node, by_events=by_events)
+        if spin is not None:
+            spin(executor, node, lambda: end.came)
+        else:
+            serve(executor, node, lambda: end.came, rest=rest)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except _START_ERRORS as error:
@@ -116,12 +122,22 @@ def _deliver(node: Node) -> None:
         publisher.wait_for_all_acked(Duration(seconds=left))
 
 
-def serve(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:
-    """Serve a node until `ended` says so or its context is shut down."""
+def serve(executor: Executor, node: Node, ended: Callable[[], bool], *, rest: float = 0.0) -> None:
+    """Serve a node until `ended` says so or its context is shut down.
+
+    Args:
+        executor: Calls the callbacks.
+        node: Whose.
+        ended: Looked at after each callback, and ten times a second while there is none.
+        rest: s to sleep after each callback, where each takes all that has come meanwhile: to
+            be woken for every message costs more than the message.
+    """
     executor.add_node(node)
     try:
         while node.context.ok() and not ended():
             executor.spin_once(timeout_sec=LOOK_UP)
+            if rest:
+                time.sleep(rest)
     finally:
         executor.remove_node(node)
         executor.shutdown()

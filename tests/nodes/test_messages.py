@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from fractions import Fraction
 
@@ -13,6 +14,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.nodes.messages import (
+    BlockReader,
     Wire,
     joint_states,
     nanoseconds,
@@ -44,6 +46,53 @@ def test_ready_made_bytes_are_the_message() -> None:
         assert message == samples_to_message(samples)
     for value in (0.0, -1.5e-300, float('inf')):
         assert deserialize_message(wire.number(value), Float64) == Float64(data=value)
+
+
+def test_a_reader_takes_every_block_for_what_it_is() -> None:
+    reader, wire = BlockReader(), Wire()
+    names = tuple('abcdefgh')
+    for seed, (rows, columns) in enumerate(
+        [(20, SAMPLE_COLUMNS), (20, SAMPLE_COLUMNS), (20, names), (7, names), (20, names)]
+    ):
+        samples = block(rows, 8, seed=seed)
+        message = samples_to_message(samples, columns)
+        back, named = reader.read(serialize_message(message))
+        assert named == columns
+        assert back.tobytes() == samples.tobytes()
+        again, named = reader.read(wire.block(samples))
+        assert named == SAMPLE_COLUMNS
+        assert again.tobytes() == samples.tobytes()
+
+
+def test_a_reader_heeds_the_offset_and_the_order_of_bytes() -> None:
+    reader = BlockReader()
+    for first in (1.0, 2.0):
+        message = samples_to_message(block(3, 8))
+        message.layout.data_offset = 1
+        message.data.insert(0, first)
+        back, _ = reader.read(serialize_message(message))
+        assert back.tobytes() == block(3, 8).tobytes()
+    # The other order: bytes of a machine whose numbers have their large end first.
+    foreign = swapped(serialize_message(samples_to_message(block(3, 8))))
+    for _ in range(2):
+        back, _ = reader.read(foreign)
+        assert back.tolist() == block(3, 8).tolist()
+
+
+def swapped(data: bytes) -> bytes:
+    """A serialised block of 3 x 8 doubles in the other order of bytes."""
+    numbers = np.frombuffer(data[-3 * 8 * 8 :], '<f8').astype('>f8').tobytes()
+    label = data.index(b'cutting_force') + len(b'cutting_force') + 1
+    start = data.index(b'time,') - 4
+    text = data[start + 4 : label]
+
+    def words(*values: int) -> bytes:
+        return struct.pack(f'>{len(values)}I', *values)
+
+    body = words(2, 7) + b'sample\0\0' + words(3, 24) + words(len(text)) + text
+    body += b'\0' * (-len(body) % 4) + words(8, 8) + words(0, 24)
+    body += b'\0' * (-len(body) % 8)
+    return b'\0\0\0\0' + body + numbers
 
 
 def test_the_layout_is_that_of_the_contract() -> None:
