@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import sys
 import time
@@ -12,7 +13,13 @@ from typing import TypeVar
 import rclpy
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+    TimeoutException,
+)
 from rclpy.node import Node
 from rclpy.qos_overriding_options import InvalidQosOverridesError
 from rclpy.signals import SignalHandlerOptions
@@ -129,18 +136,33 @@ def serve(executor: Executor, node: Node, ended: Callable[[], bool], *, rest: fl
         executor: Calls the callbacks.
         node: Whose.
         ended: Looked at after each callback, and ten times a second while there is none.
-        rest: s to sleep after each callback, where each takes all that has come meanwhile: to
-            be woken for every message costs more than the message.
+        rest: s to sleep once nothing is ready any more, where callbacks take all that has come
+            meanwhile: to be woken for every message costs more than the message. Only for an
+            executor of rclpy itself.
     """
     executor.add_node(node)
     try:
         while node.context.ok() and not ended():
-            executor.spin_once(timeout_sec=LOOK_UP)
             if rest:
+                _serve_ready(executor)
                 time.sleep(rest)
+            else:
+                executor.spin_once(timeout_sec=LOOK_UP)
     finally:
         executor.remove_node(node)
         executor.shutdown()
+
+
+def _serve_ready(executor: Executor) -> None:
+    """Wait for something to do, and do all that is ready, for as long as a look-up at most."""
+    until = time.monotonic() + LOOK_UP
+    with contextlib.suppress(TimeoutException, ShutdownException):
+        timeout = LOOK_UP
+        while time.monotonic() < until:
+            task, _entity, _node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
+            task()
+            task.result()  # raises what the callback has raised
+            timeout = 0.0
 
 
 def make_executor(node: Node, *, by_events: bool = True) -> Executor:
