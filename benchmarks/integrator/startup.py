@@ -1,0 +1,64 @@
+"""How long a program waits for its first sample, its machine code compiled before."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+
+from figures import Figure, Line, tracked
+
+from lathe_chatter.lathe import VirtualLathe
+
+_REPEATS = 5
+_GOAL = 1.0
+
+_SCRIPT = """
+import json, time
+marks = [(time.perf_counter(), time.process_time())]
+def mark():
+    marks.append((time.perf_counter(), time.process_time()))
+import numpy; mark()
+import numba; mark()
+import lathe_chatter.lathe; mark()
+lathe = lathe_chatter.lathe.VirtualLathe(); mark()
+lathe.advance(1); mark()
+print(json.dumps(marks))
+"""
+_STAGES = (
+    'import of numpy',
+    'import of numba',
+    'import of lathe_chatter.lathe beyond them',
+    'VirtualLathe(), with what numba loads for it',
+    'first sample',
+)
+
+
+def startup() -> list[Line]:
+    """Import of the package and a first step, in fresh interpreters."""
+    VirtualLathe().advance(1)  # whatever has to be compiled is compiled now
+    runs = []
+    for _ in tracked(range(_REPEATS), 'fresh interpreters'):
+        output = subprocess.check_output([sys.executable, '-c', _SCRIPT])  # noqa: S603 -- our own
+        runs.append(json.loads(output))
+    lines: list[Line] = []
+
+    def medians(begin: int, end: int) -> tuple[float, float]:
+        wall, cpu = (
+            statistics.median(marks[end][clock] - marks[begin][clock] for marks in runs)
+            for clock in (0, 1)
+        )
+        return wall, cpu
+
+    whole, whole_cpu = medians(0, len(_STAGES))
+    lines.append(
+        Figure(
+            f'import and first step: median of {_REPEATS}', whole, 's', _GOAL,
+            note=f'{whole_cpu:.2f} s of CPU time',
+        )
+    )  # fmt: skip
+    for k, stage in enumerate(_STAGES):
+        wall, cpu = medians(k, k + 1)
+        lines.append(Figure(f'   {stage}', wall, 's', note=f'{cpu:.2f} s of CPU time'))
+    return lines
