@@ -29,7 +29,7 @@ from startup import startup
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])  # type: ignore[union-attr]  # it is above
+    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
     parser.add_argument('parts', nargs='*', metavar='part')
     parser.add_argument('--long', action='store_true', help='memory after 10^9 steps')
     parser.add_argument('--json', action='store_true', help='print the figures as JSON')

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 from cases import CHATTER, DURATION, LINEAR, PAPER, RATE, Case, error, exact, located, run
-from cases import references as measures
 from figures import Figure, Line, tracked
+from reference.solution import event_error, relative_error
 
+from lathe_chatter.lathe import Event
 from lathe_chatter.model import Array
 
 _RAMP = 3e4  # rev/min per s
@@ -28,7 +29,7 @@ def against_thirty_digits() -> list[Line]:
     for case in tracked(PAPER, 'against the Taylor reference'):
         found, expected = run(case), exact(case)
         errors.append(error(found, expected))
-        late.append(measures.event_error(found.events, expected.events))
+        late.append(event_error(found.events, expected.events))
         miscounted += abs(len(found.events) - len(expected.events))
         note = f'{len(found.events)} events of {len(expected.events)}, within {late[-1]:.1e} s'
         lines.append(Figure(f'error: {case.name}', errors[-1], goal=1e-9, note=note))
@@ -58,15 +59,15 @@ def against_a_tenth_of_the_step() -> list[Line]:
     ]
     for what, case in tracked(variants, 'against a tenth of the step'):
         (coarse, found), (fine, expected) = refined(case, 1), refined(case, 10)
-        size = measures.relative_error(coarse, fine, RATE)
-        late = measures.event_error(located(found), located(expected))
+        size = relative_error(coarse, fine, RATE)
+        late = event_error(located(found), located(expected))
         force = 'total force, gap 5 um' if case.total_force else 'linear force, none'
         note = f'{len(found)} events of {len(expected)}, within {late:.1e} s'
         lines.append(Figure(f'a tenth of the step: {what}, {force}', size, goal=1e-8, note=note))
     return lines
 
 
-def refined(case: Case, refinement: int) -> tuple[Array, list]:
+def refined(case: Case, refinement: int) -> tuple[Array, list[Event]]:
     """States at every 100 us and the events, taken in steps that many times shorter."""
     lathe = case.lathe(RATE * refinement)
     before = round(_RAMP_BEGINS * RATE)

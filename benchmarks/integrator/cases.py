@@ -14,8 +14,7 @@ from lathe_chatter.model import BearingContact, Cut, Machine
 
 sys.path.append(str(CHECKOUT / 'tests'))
 
-from reference import dop853, taylor
-from reference import solution as references
+from reference import dop853, solution, taylor
 
 RATE = 1e4
 """Hz: steps of 100 us."""
@@ -79,35 +78,35 @@ PAPER = tuple(
 )
 
 
-def located(events: list[Event]) -> tuple[references.Event, ...]:
+def located(events: list[Event]) -> tuple[solution.Event, ...]:
     """A lathe's events as the references write theirs."""
-    return tuple(references.Event(event.time, *_EVENTS[event.kind]) for event in events)
+    return tuple(solution.Event(event.time, *_EVENTS[event.kind]) for event in events)
 
 
-def run(case: Case) -> references.Solution:
+def run(case: Case) -> solution.Solution:
     """The lathe's own solution over `DURATION`."""
     lathe = case.lathe()
     samples = lathe.advance(round(DURATION * RATE))
     if lathe.guard:
         raise ArithmeticError(lathe.guard)
-    return references.Solution(samples[:, 2:6], located(lathe.events))
+    return solution.Solution(samples[:, 2:6], located(lathe.events))
 
 
 @lru_cache
-def exact(case: Case) -> references.Solution:
+def exact(case: Case) -> solution.Solution:
     """The solution to 36 digits, by the Taylor method of steps."""
     return _solve(taylor.solve, case)
 
 
-def by_dop853(case: Case) -> references.Solution:
+def by_dop853(case: Case) -> solution.Solution:
     """The solution by SciPy's DOP853 and the method of steps."""
     return _solve(dop853.solve, case)
 
 
-def _solve(solve: Callable[..., references.Solution], case: Case) -> references.Solution:
+def _solve(solve: Callable[..., solution.Solution], case: Case) -> solution.Solution:
     return solve(Machine(), case.cut, DURATION, sample_rate=RATE, tool_leaves_cut=case.total_force)
 
 
-def error(found: references.Solution, expected: references.Solution) -> float:
-    """Largest error over the local amplitude, see `references.relative_error`."""
-    return references.relative_error(found.states, expected.states, RATE)
+def error(found: solution.Solution, expected: solution.Solution) -> float:
+    """Largest error over the local amplitude, see `solution.relative_error`."""
+    return solution.relative_error(found.states, expected.states, RATE)

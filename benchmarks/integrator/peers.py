@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 from cases import CHATTER, DURATION, LINEAR, RATE, TOUCHING, Case, by_dop853, error, exact, run
-from cases import references as measures
 from figures import Figure, Line, Missing, progress, tracked
+from reference.solution import event_error, relative_error
 from speed import cost
 
 from lathe_chatter.model import Machine, Mode, paper_initial_state
@@ -105,7 +105,7 @@ def beside_dop853() -> list[Line]:
         began = time.process_time()
         found = by_dop853(case)
         cpu, mine = time.process_time() - began, statistics.median(cost(case).cpu)
-        late = measures.event_error(found.events, exact(case).events)
+        late = event_error(found.events, exact(case).events)
         own = run(case)
         lines += [
             Figure(f'DOP853 method of steps, {what}: CPU', cpu / DURATION, 's per s'),
@@ -191,7 +191,7 @@ def cut_with_jitcdde(case: Case, python: Path, atol: float = 1e-16) -> Peer:
             states = exact(case).states.copy()
             states[int(found['first']) - 1 :] = found['states']
             return Peer(
-                measures.relative_error(states, exact(case).states, RATE),
+                relative_error(states, exact(case).states, RATE),
                 float(np.median(found['cpu'])) / DURATION,
                 float(found['compiling']),
                 str(found['versions']),
