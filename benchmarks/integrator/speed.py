@@ -47,32 +47,42 @@ def speed() -> list[Line]:
     """Nanoseconds a step, and how much faster than time itself."""
     uneven = LINEAR.with_changes(spindle_speed_rpm=3001.7)
     varied = LINEAR.with_changes(speed_variation_amplitude=0.2)
-    runs: list[tuple[str, Case, float, float | None]] = [
-        ('without contact', LINEAR, 0.0, 30.0),
-        ('without contact, 10000 rev/min', LINEAR.with_changes(spindle_speed_rpm=1e4), 0.0, 30.0),
-        ('without contact, 3001.7 rev/min', uneven, 0.0, 30.0),
-        ('without contact, speed varied', varied, 0.0, None),
-        ('with contact, gap 60 um, linear', TOUCHING.with_changes(bearing_clearance=6e-5), 0, 60),
-        ('with contact, gap 5 um, linear', TOUCHING, 0.0, 60.0),
-        ('out of cut, none, total', replace(LINEAR, total_force=True), _SETTLED, 60.0),
-        ('contact and out of cut, gap 5 um, total', CHATTER, _SETTLED, 60.0),
-    ]
     lines: list[Line] = []
-    for what, case, settled, goal in tracked(runs, 'cost of a step'):
-        found = cost(case, settled)
-        per_step = 1e9 / found.steps
-        note = (
-            f'CPU median {per_step * statistics.median(found.cpu):.1f}; '
-            f'clock best {per_step * min(found.wall):.1f}, '
-            f'median {per_step * statistics.median(found.wall):.1f}'
-        )
-        best = per_step * min(found.cpu)
-        lines.append(Figure(f'step, {what}: best of {_REPEATS}', best, 'ns', goal, note=note))
-        factor = DURATION / min(found.wall)
-        median = f'median {DURATION / statistics.median(found.wall):.0f}'
-        lines.append(
-            Figure(
-                '   simulated seconds per second', factor, '', 3000.0, at_least=True, note=median
-            )
-        )
+    free = (
+        ('without contact', LINEAR),
+        ('without contact, 10000 rev/min', LINEAR.with_changes(spindle_speed_rpm=1e4)),
+        ('without contact, 3001.7 rev/min', uneven),
+    )
+    for what, case in tracked(free, 'steps without contact'):
+        lines += _lines(what, cost(case), 30.0, 3000.0)
+    touching = (
+        ('with contact, gap 60 um, linear', TOUCHING.with_changes(bearing_clearance=6e-5), 0.0),
+        ('with contact, gap 5 um, linear', TOUCHING, 0.0),
+        ('out of cut, none, total', replace(LINEAR, total_force=True), _SETTLED),
+        ('contact and out of cut, gap 5 um, total', CHATTER, _SETTLED),
+    )
+    for what, case, settled in tracked(touching, 'steps with contact'):
+        lines += _lines(what, cost(case, settled), 60.0)
+    lines += _lines('without contact, speed varied', cost(varied))
     return lines
+
+
+def _lines(
+    what: str, found: Cost, goal: float | None = None, factor_goal: float | None = None
+) -> list[Line]:
+    per_step = 1e9 / found.steps
+    note = (
+        f'CPU median {per_step * statistics.median(found.cpu):.1f}; '
+        f'clock best {per_step * min(found.wall):.1f}, '
+        f'median {per_step * statistics.median(found.wall):.1f}'
+    )
+    return [
+        Figure(
+            f'step, {what}: best of {_REPEATS}', per_step * min(found.cpu), 'ns', goal, note=note
+        ),
+        Figure(
+            '   simulated seconds per second', DURATION / min(found.wall),
+            goal=factor_goal, at_least=True,
+            note=f'median {DURATION / statistics.median(found.wall):.0f}',
+        ),
+    ]  # fmt: skip
