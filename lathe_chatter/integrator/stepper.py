@@ -36,7 +36,7 @@ def new_scratch() -> Scratch:
 @compiled(inline=True, borrows=True)
 def is_measured(settings: Array) -> bool:
     """Whether sensors see something beside the motion."""
-    return settings[layout.RUNOUT] > 0.0 or settings[layout.SENSOR_NOISE] > 0.0
+    return bool(settings[layout.RUNOUT] > 0.0 or settings[layout.SENSOR_NOISE] > 0.0)
 
 
 @compiled(borrows=True)
