@@ -2,8 +2,9 @@
 
     python benchmarks/integrator [accuracy] [speed] [peers] [startup] [memory] [--long] [--json]
 
-All parts by default, about two minutes. --long takes the 10^9 steps of the memory part, which are
-some minutes more. CPU time is what a busy machine leaves comparable; the clock's time stands beside it.
+All parts by default, about two minutes. --long takes the 10^9 steps of the memory part, which
+are some minutes more. CPU time is what a busy machine leaves comparable; the clock's time stands
+beside it.
 """
 
 from __future__ import annotations
