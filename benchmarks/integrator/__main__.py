@@ -1,10 +1,10 @@
 """The integrator's figures on this machine, beside jitcdde and SciPy's DOP853.
 
-    python benchmarks/integrator [accuracy] [speed] [peers] [startup] [memory] [--long] [--json]
+    python benchmarks/integrator [PART ...] [--long] [--json]
 
-All parts by default, about two minutes. --long takes the 10^9 steps of the memory part, which
-are some minutes more. CPU time is what a busy machine leaves comparable; the clock's time stands
-beside it.
+The parts are accuracy, speed, peers, startup, sweep and memory: all by default, about two
+minutes. --long takes the 10^9 steps of the memory part, which are some minutes more. CPU time is
+what a busy machine leaves comparable; the clock's time stands beside it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from dataclasses import asdict
 
 import figures
 from accuracy import accuracy
+from many import many
 from memory import cut, memory
 from peers import peers
 from speed import speed
@@ -45,6 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         'speed': speed,
         'peers': peers,
         'startup': startup,
+        'sweep': many,
         'memory': lambda: memory(10**9 if options.long else 10**7),
     }
     unknown = set(options.parts) - set(parts)

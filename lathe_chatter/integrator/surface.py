@@ -42,10 +42,15 @@ MERGE = 1e-9
 
 def empty_nodes(*shape: int) -> Array:
     """Room for nodes (*shape, NODE_SIZE), each in one line of the processor's cache."""
-    size = NODE_SIZE * math.prod(shape)
-    room = np.zeros(size + NODE_SIZE)
+    return aligned(*shape, NODE_SIZE)
+
+
+def aligned(*shape: int) -> Array:
+    """Zeros that begin where a line of the processor's cache does."""
+    size = math.prod(shape)
+    room = np.zeros(size + _CACHE_LINE // 8)
     first = -room.ctypes.data % _CACHE_LINE // room.itemsize
-    return room[first : first + size].reshape(*shape, NODE_SIZE)
+    return room[first : first + size].reshape(shape)
 
 
 def with_room(nodes: Array, capacity: int) -> Array:
