@@ -17,7 +17,8 @@ from lathe_chatter.recording.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.frames import to_pandas, to_xarray
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
-from lathe_chatter.recording.sample_cuts import Cut, cut_of, cuts_by_index
+from lathe_chatter.recording.sample_columns import Cut, cut_of
+from lathe_chatter.recording.sample_cuts import cuts_by_index
 from lathe_chatter.recording.sample_series import Samples, joined
 from lathe_chatter.recording.scan import Damage
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lathe_chatter.model import Array, Integers
-from lathe_chatter.recording.sample_cuts import Cut
+from lathe_chatter.recording.sample_columns import Cut
 
 _LARGER_THAN_STEP = 1.5
 """A step of time between two samples so many times the usual one is a gap."""

@@ -107,7 +107,7 @@ def scan(file: Path, wanted: Wanted | None = None) -> Iterator[Chunk | Plain | D
 
 
 def read_chunk(file: Path, descriptor: int, place: ChunkPlace) -> Chunk | Damage:
-    """A chunk that an index names, or what is wrong with it; its message indexes are left out.
+    """A chunk that an index names with its message indexes, or what is wrong with it.
 
     Args:
         file: Its name.
@@ -121,18 +121,34 @@ def read_chunk(file: Path, descriptor: int, place: ChunkPlace) -> Chunk | Damage
 
 
 def _chunk_at(descriptor: int, place: ChunkPlace) -> Chunk:
-    data = os.pread(descriptor, place.length, place.offset)
+    whole = memoryview(os.pread(descriptor, place.length + place.index_length, place.offset))
+    data, indexes = whole[: place.length], whole[place.length :]
     if len(data) < place.length or len(data) < _HEAD.size + _CHUNK.size:
         raise _BadChunkError('a chunk of the index is cut off')
     opcode, length = _HEAD.unpack_from(data)
     if (opcode, length) != (Opcode.CHUNK, place.length - _HEAD.size):
         raise _BadChunkError('a chunk of the index is not there')
-    fields = _fields(data[_HEAD.size : _HEAD.size + _FIELDS_ROOM], length)
+    fields = _fields(bytes(data[_HEAD.size : _HEAD.size + _FIELDS_ROOM]), length)
     if fields is None:
         raise _BadChunkError('the head of a chunk is damaged')
     first, last, size, crc, name, begin = fields
-    records = _decompressed(memoryview(data)[_HEAD.size + begin :], name, size, crc)
-    return Chunk(place.offset, first, last, records, {})
+    records = _decompressed(data[_HEAD.size + begin :], name, size, crc)
+    return Chunk(place.offset, first, last, records, _indexes_in(indexes))
+
+
+def _indexes_in(data: memoryview) -> dict[int, bytes]:
+    """The message indexes behind a chunk by channel, as far as they can be read."""
+    found: dict[int, bytes] = {}
+    place = 0
+    while place + _HEAD.size + _INDEX.size <= len(data):
+        opcode, length = _HEAD.unpack_from(data, place)
+        channel, size = _INDEX.unpack_from(data, place + _HEAD.size)
+        end = place + _HEAD.size + length
+        if opcode != Opcode.MESSAGE_INDEX or length != _INDEX.size + size or end > len(data):
+            break
+        found[channel] = bytes(data[place + _HEAD.size + _INDEX.size : end])
+        place = end
+    return found
 
 
 class _Walk:

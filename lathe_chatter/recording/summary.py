@@ -19,16 +19,37 @@ _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
 _AT_ONCE = 1 << 22
 _HEAD = struct.Struct('<BQ')
-_CHUNK_INDEX = struct.Struct('<16xQQ')
+_CHUNK_INDEX = struct.Struct('<16xQQI')
+_CHANNEL_OFFSET = struct.Struct('<HQ')
 _WANTED = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 
 
 class ChunkPlace(NamedTuple):
-    """Where a chunk is in its file, and the size of its records before compression, bytes."""
+    """Where a chunk is in its file.
+
+    Attributes:
+        offset: Of its first byte.
+        length: Bytes.
+        size: Of its records before compression, bytes.
+        index_length: Bytes of the message indexes, which follow it.
+        indexes: Where each of them is in the file, as pairs of channel and offset ('<HQ').
+    """
 
     offset: int
     length: int
     size: int
+    index_length: int
+    indexes: bytes
+
+    def index_of(self, channel: int) -> tuple[int, int] | None:
+        """Where the message index of a channel begins and ends; None where it has none."""
+        ends = self.offset + self.length + self.index_length
+        places = [*_CHANNEL_OFFSET.iter_unpack(self.indexes)]
+        begins = sorted([offset for _, offset in places] + [ends])
+        for number, offset in places:
+            if number == channel:
+                return offset, begins[begins.index(offset) + 1]
+        return None
 
 
 @dataclass
@@ -105,13 +126,23 @@ def _parsed(data: bytes, start: int) -> Summary:
         opcode, length = _HEAD.unpack_from(data, place)
         place += _HEAD.size
         if opcode == Opcode.CHUNK_INDEX:
-            offset, size = _CHUNK_INDEX.unpack_from(data, place)
-            (uncompressed,) = struct.unpack_from('<Q', data, place + length - 8)
-            summary.chunks.append(ChunkPlace(offset, size, uncompressed))
+            summary.chunks.append(_chunk_place(data, place, length))
         elif opcode in _WANTED:
             add_record(summary, opcode, data[place : place + length])
         place += length
     return summary
+
+
+def _chunk_place(data: bytes, place: int, length: int) -> ChunkPlace:
+    """What a chunk index says; the fields of the specification that are not named are not used."""
+    offset, size, letters = _CHUNK_INDEX.unpack_from(data, place)
+    begin = place + _CHUNK_INDEX.size
+    indexes = data[begin : begin + letters]
+    (index_length,) = struct.unpack_from('<Q', data, begin + letters)
+    (uncompressed,) = struct.unpack_from('<Q', data, place + length - 8)
+    if len(indexes) % _CHANNEL_OFFSET.size:
+        raise ValueError('A chunk index has half an entry.')
+    return ChunkPlace(offset, size, uncompressed, index_length, indexes)
 
 
 def add_record(summary: Summary, opcode: int, content: bytes) -> None:

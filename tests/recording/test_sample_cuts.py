@@ -30,8 +30,10 @@ def samples() -> Array:
     return samples_of(BLOCKS)
 
 
-@pytest.fixture(scope='module')
-def folder(tmp_path_factory: pytest.TempPathFactory, samples: Array) -> Path:
+@pytest.fixture(scope='module', params=[3, 40], ids=['scattered', 'in stretches'])
+def folder(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, samples: Array
+) -> Path:
     """A long run among whose samples are other messages; its last block is shorter."""
     folder = tmp_path_factory.mktemp('long') / 'run'
     with RunWriter(folder) as writer:
@@ -41,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, samples: Array) -> Path:
             part = samples[k * ROWS : (k + 1) * ROWS - (k == BLOCKS - 1)]
             time = START + k * 500_000
             writer.write('/lathe/samples', samples_bytes(part), log_time=time, publish_time=time)
-            if k % 3 == 0:
+            if k % request.param == 0:
                 writer.write('/numbers', number(k), log_time=time, publish_time=time)
             if k % PER_COMMIT == PER_COMMIT - 1:
                 writer.commit_soon()
@@ -76,6 +78,26 @@ def test_a_range_of_time_is_cut_out(folder: Path, samples: Array) -> None:
     found = read_run(folder).samples(columns=['time'], start=0.50005, end=1.5)
     inside = samples[(samples[:, 0] >= 0.50005) & (samples[:, 0] <= 1.5), 0]
     assert found.columns['time'].tolist() == inside.tolist()
+
+
+def test_a_damaged_message_index_leads_nobody_astray(
+    folder: Path, samples: Array, tmp_path: Path
+) -> None:
+    whole = (folder / 'run_0.mcap').read_bytes()
+    chunks = RecordedFile(folder / 'run_0.mcap', lambda _damage: None).known.chunks
+    generator = np.random.default_rng(5)
+    file = tmp_path / 'run_0.mcap'
+    for chunk in generator.integers(len(chunks), size=8):
+        place = chunks[chunk]
+        begin = place.offset + place.length
+        data = bytearray(whole)
+        data[begin + generator.integers(place.index_length)] ^= 1 << generator.integers(8)
+        file.write_bytes(data)
+        try:
+            found = array_of(read_run(file).samples().columns)
+        except RunReadError:
+            continue
+        assert found.tobytes() == samples[:-1].tobytes()
 
 
 @pytest.mark.parametrize('chunk', [0, 23, 59])
