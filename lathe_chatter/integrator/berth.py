@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from lathe_chatter.compiled import compiled
@@ -134,7 +135,10 @@ def load(g: Group, lane: int) -> None:
     c[lanes.PER_SQUARE * LANES + lane] = 1.0 / (speed * speed)
     c[lanes.FEED * LANES + lane] = feed_speed * step
     c[lanes.FEED_SPEED * LANES + lane] = feed_speed
-    c[lanes.NOMINAL * LANES + lane] = settings[layout.NOMINAL_FEED_SPEED] / speed
+    total = settings[layout.MAY_LEAVE_CUT] != 0.0
+    nominal = settings[layout.NOMINAL_FEED_SPEED] / speed
+    c[lanes.NOMINAL * LANES + lane] = 0.0 if total else nominal
+    c[lanes.LEAST * LANES + lane] = 0.0 if total else -math.inf
     c[lanes.LIMIT * LANES + lane] = settings[layout.LIMIT]
     c[lanes.STIFFNESS * LANES + lane] = settings[layout.CUTTING_STIFFNESS]
     c[lanes.MAY_LEAVE * LANES + lane] = settings[layout.MAY_LEAVE_CUT]

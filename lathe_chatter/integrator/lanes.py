@@ -30,11 +30,12 @@ STATE_FIGURES = 16
 
 # What it does not change, and what became of it.
 (
-    TURNS, RATE, STEP, RISE, SPEED, PER_SPEED, SQUARE, PER_SQUARE, FEED, FEED_SPEED, NOMINAL,
+    TURNS, RATE, STEP, RISE, SPEED, PER_SPEED, SQUARE, PER_SQUARE, FEED, FEED_SPEED,
+    NOMINAL, LEAST,  # chip thickness: what is added to h, and what it is at least
     LIMIT, STIFFNESS, MAY_LEAVE, HAS_CLEARANCE, GAMMA, BEARING_SIDE,
     FLAG,  # see `take_step`
     SAMPLE,  # the eight columns of the last sample
-) = range(19)  # fmt: skip
+) = range(20)  # fmt: skip
 COLUMNS = 8
 MATRIX = SAMPLE + COLUMNS  # rows 0-10 of the regime, component by component
 BEND = MATRIX + 44  # and its relative acceleration
@@ -188,13 +189,14 @@ def next_turn(state: Array, c: Array, ring: Array) -> None:
 def take_sample(state: Array, c: Array, samples: int) -> None:
     """Put the present sample, columns as in `model.SAMPLE_COLUMNS`, into its figures."""
     for i in range(LANES):
-        chip, total = state[CHIP * LANES + i], c[MAY_LEAVE * LANES + i] != 0.0
         c[SAMPLE * LANES + i] = samples / c[RATE * LANES + i]
         c[(SAMPLE + 1) * LANES + i] = c[TURNS * LANES + i] + state[ANGLE * LANES + i]
+    for i in range(LANES):
         c[(SAMPLE + 2) * LANES + i] = state[XT * LANES + i]
         c[(SAMPLE + 3) * LANES + i] = state[VT * LANES + i]
         c[(SAMPLE + 4) * LANES + i] = state[XW * LANES + i]
         c[(SAMPLE + 5) * LANES + i] = state[VW * LANES + i]
-        thickness = max(chip, 0.0) if total else chip + c[NOMINAL * LANES + i]
-        c[(SAMPLE + 6) * LANES + i] = thickness
+    for i in range(LANES):
+        chip = state[CHIP * LANES + i]
+        c[(SAMPLE + 6) * LANES + i] = max(chip + c[NOMINAL * LANES + i], c[LEAST * LANES + i])
         c[(SAMPLE + 7) * LANES + i] = c[STIFFNESS * LANES + i] * chip
