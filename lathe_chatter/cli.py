@@ -50,6 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except LatheChatterError as error:
         sys.stderr.write(f'lathe-chatter {options.verb}: {error}\n')
         return USER_ERROR
+    except OSError as error:
+        where = f'{error.filename}: ' if error.filename else ''
+        sys.stderr.write(f'lathe-chatter {options.verb}: {where}{error.strerror or error}.\n')
+        return USER_ERROR
     except KeyboardInterrupt:
         return INTERRUPTED
     return code

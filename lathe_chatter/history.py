@@ -129,11 +129,9 @@ def _topic(run: Run, ending: str) -> str:
 def _series(run: Run, samples: Samples, ending: str) -> Array:
     """A figure of the monitor over simulated time (2, m)."""
     topic = _topic(run, f'chatter_monitor{ending}')
-    pairs = [
-        (samples.simulated_time(recorded.log_time), recorded.message.data)
-        for recorded in (run.messages(topic) if topic else ())
-    ]
-    return np.array(pairs).reshape(-1, 2).T
+    found = [*run.messages(topic)] if topic else []
+    times = samples.simulated_time([each.log_time for each in found])
+    return np.array([times, [each.message.data for each in found]])
 
 
 def _flags(run: Run, samples: Samples, estimates: Mapping[str, Array]) -> list[Flag]:
@@ -145,7 +143,7 @@ def _flags(run: Run, samples: Samples, estimates: Mapping[str, Array]) -> list[F
         if recorded.message.data == up:
             continue
         up = recorded.message.data
-        time = samples.simulated_time(recorded.log_time)
+        (time,) = samples.simulated_time([recorded.log_time]).tolist()
         at = {name: value_near(estimates[name], time) for name in ('frequency', 'growth_rate')}
         flags.append(Flag(time, up, **at))
     return flags

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from lathe_chatter.recording import resimulate, verify
+from lathe_chatter.recording import RunReadError, resimulate, verify
 from lathe_chatter.recording.resimulate import finding_of
 
 NAME = 'verify'
@@ -31,8 +31,11 @@ def run(options: Namespace) -> int:
     """Verify; 0 if nothing is missing, else 1."""
     found = verify(options.run_path)
     if options.resimulate:
-        for again in resimulate(found.run):
-            found.findings.append(finding_of(again))
+        try:
+            found.findings += [finding_of(again) for again in resimulate(found.run)]
+        except RunReadError:
+            if found.complete:  # else there are reasons enough
+                raise
     console = Console(highlight=False, soft_wrap=True)
     if options.json:
         figures = {

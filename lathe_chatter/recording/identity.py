@@ -27,7 +27,7 @@ RECOVERED = 'lathe_chatter/recovered'
 """Name of the record of a run that was recovered: from which, and what could not be read."""
 
 
-_CORE = ('integrator/*.py', 'compiled.py', 'lathe.py', 'lathe_state.py', 'model.py')
+_CORE = ('integrator/*.py', 'compiled.py', 'lathe*.py', 'model.py')
 
 
 def core_identity() -> dict[str, str]:

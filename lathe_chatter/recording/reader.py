@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.recording.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.frames import to_pandas, to_xarray
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
+from lathe_chatter.recording.run_folder import RunReadError, run_folder
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
 from lathe_chatter.recording.sample_columns import Cut, cut_of
 from lathe_chatter.recording.sample_cuts import cuts_by_index
@@ -24,13 +23,9 @@ from lathe_chatter.recording.scan import Damage
 
 __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 
+_REST = 'What is left of it can be saved by `lathe-chatter recover`.'
 _CHUNKS_AT_ONCE = 16
 """Arrays of a single chunk are so small that calls would cost more than their work."""
-_SPLIT = re.compile(r'_(\d+)\.mcap$')
-
-
-class RunReadError(LatheChatterError):
-    """A path that holds no run that can be read; the text says why."""
 
 
 class Raw(NamedTuple):
@@ -248,8 +243,7 @@ class Run:
     def _on_damage(self, damage: Damage) -> None:
         if not self.damaged:
             raise RunReadError(
-                f'{damage.file} is damaged at byte {damage.start}: {damage.reason}. What is left '
-                'of it can be saved by `lathe-chatter recover`.'
+                f'{damage.file} is damaged at byte {damage.start}: {damage.reason}. {_REST}'
             )
         if damage not in self.damage:
             self.damage.append(damage)
@@ -303,19 +297,14 @@ def read_run(path: Path | str, *, damaged: bool = False) -> Run:
             missing is then in `Run.damage`, and among the gaps of the samples.
 
     Raises:
-        RunReadError: If there is no such run.
+        RunReadError: If there is no such run, or a file of it is missing.
     """
     path = Path(path)
     if path.is_file():
         return Run(path, (path,), damaged)
-    files = list(path.glob('*.mcap'))
-    if not files:
-        what = 'holds no recorded run' if path.is_dir() else 'does not exist'
-        raise RunReadError(f'{path} {what}.')
-    return Run(path, tuple(sorted(files, key=_split_number)), damaged)
-
-
-def _split_number(file: Path) -> int:
-    """The place of a file among those of a split run."""
-    match = _SPLIT.search(file.name)
-    return int(match[1]) if match else 0
+    found = run_folder(path)
+    absent = [Damage(path / name, 0, 0, 'the file is missing') for name in found.missing]
+    if absent and not damaged:
+        names = ', '.join(found.missing)
+        raise RunReadError(f'{path} lacks {names}. {_REST}')
+    return Run(path, found.files, damaged, absent)

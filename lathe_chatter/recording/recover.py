@@ -44,9 +44,9 @@ def recover(path: Path | str, output: Path) -> Recovery:
         RunExistsError: If the folder to make exists.
         OSError: If it cannot be written.
     """
-    old = read_run(path)
+    old = read_run(path, damaged=True)
     saved: Counter[str] = Counter()
-    damage: list[Damage] = []
+    damage: list[Damage] = [*old.damage]
     with RunWriter(output) as writer:
         for place, file in enumerate(old.files):
             if place:

@@ -137,6 +137,16 @@ def _excuse(run: Run, replay: _Replay) -> str:
     ]
     if other:
         return f'It was computed by other software: {", ".join(other)}.'
+    if replay.after_gap:
+        return (
+            'Samples are missing before it, and what happened to the cut meanwhile may be missing '
+            'too.'
+        )
+    if not replay.logged:
+        return (
+            'The record has nothing of the log of the lathe: whether its cut was changed is not '
+            'known.'
+        )
     if not replay.whole and not replay.compared:
         return (
             'The record does not begin with the cut: what was changed before it began is not '
@@ -151,12 +161,16 @@ class _Replay:
     Attributes:
         compared: Samples that were equal.
         whole: Whether the record says of the present act how it began.
+        logged: Whether the record says anything of what happened to the cut.
+        after_gap: Whether samples are missing between the last that was equal and the next.
     """
 
     def __init__(self, told: Told) -> None:
         if not told.parameters:
             raise _CannotError('The run does not say with what parameters the lathe was started.')
         self.compared = 0
+        self.after_gap = False
+        self.logged = told.logged
         self._told = told
         self._act = -1
         self._place: int | None = None
@@ -190,6 +204,7 @@ class _Replay:
             if difference is not None:
                 return difference
             self.compared += len(samples)
+            self.after_gap = False
         return None
 
     def _pieces(self, blocks: Blocks) -> Iterator[Array]:
@@ -209,6 +224,7 @@ class _Replay:
                 self._do(happened)
             self._begin(self._lathe.cut)
         while self._lathe.samples_taken < place:
+            self.after_gap = self.compared > 0
             self._cut(min(place - self._lathe.samples_taken, _AT_ONCE))
             if self._lathe.guard:
                 raise _CannotError(f'The lathe ends before the samples do. {self._lathe.guard}')
@@ -221,6 +237,7 @@ class _Replay:
             wrong = np.argwhere(recorded.view(np.uint64) != computed.view(np.uint64))
             if len(wrong):
                 row, column = (int(each) for each in wrong[0])
+                self.after_gap = self.after_gap and not done + row
                 self.compared += done + row
                 return Difference(
                     float(computed[row, 0]),

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lathe_chatter.model import Array, Integers
 from lathe_chatter.recording.sample_columns import Cut
@@ -31,10 +32,16 @@ class Samples(NamedTuple):
     gaps: list[tuple[float, float]]
     restarts: list[tuple[float, float]]
 
-    def simulated_time(self, log_time: int) -> float:
-        """Simulated time when something else was recorded, s: that of the blocks about it."""
+    def simulated_time(self, log_times: ArrayLike) -> Array:
+        """Simulated times when other things were recorded, s: those of the blocks about them.
+
+        Args:
+            log_times: Of these, ns since the epoch (m,).
+        """
         relative = (self.log_times - self.log_times[0]).astype(float)
-        return float(np.interp(float(log_time - self.log_times[0]), relative, self.block_ends))
+        asked = np.asarray(log_times, np.int64) - self.log_times[0]
+        found: Array = np.interp(asked.astype(float), relative, self.block_ends)
+        return found
 
 
 class Seams:

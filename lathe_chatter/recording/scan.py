@@ -82,7 +82,8 @@ class Damage(NamedTuple):
 
     def __str__(self) -> str:
         """One sentence."""
-        return f'{self.file.name}, bytes {self.start} to {self.end}: {self.reason}.'
+        where = f', bytes {self.start} to {self.end}' if self.end else ''
+        return f'{self.file.name}{where}: {self.reason}.'
 
 
 class _BadChunkError(Exception):

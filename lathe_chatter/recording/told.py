@@ -47,6 +47,11 @@ class Told:
     acts: tuple[Act, ...]
 
     @property
+    def logged(self) -> bool:
+        """Whether anything of its log is in the record."""
+        return any(act.beginning or act.happenings for act in self.acts)
+
+    @property
     def changes(self) -> Iterator[Change]:
         """The changes of the cut, in order."""
         for act in self.acts:

@@ -11,8 +11,6 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
-
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.identity import IDENTITY, RECEPTION, RECOVERED, STALLS
 from lathe_chatter.recording.metadata import FILE_NAME
@@ -20,6 +18,7 @@ from lathe_chatter.recording.numbering import Numbering
 from lathe_chatter.recording.reader import Run, read_run
 from lathe_chatter.recording.recorded_file import Note, RecordedFile, offers_of
 from lathe_chatter.recording.run_files import CLOSED
+from lathe_chatter.recording.run_folder import run_folder
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
 from lathe_chatter.recording.sample_series import Seams
 from lathe_chatter.recording.summary import body_is_sound, read_summary
@@ -54,12 +53,19 @@ class Verification:
         messages: By name of topic.
         samples: By name of topic.
         findings: Losses and remarks.
+        finished: Whether its recorder came to an end, or is not ours to tell.
     """
 
     run: Run
     messages: Counter[str] = field(default_factory=Counter)
     samples: dict[str, SampleCount] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
+    finished: bool = True
+
+    @property
+    def missing(self) -> set[str]:
+        """Names of files that are not there."""
+        return {damage.file.name for damage in self.run.damage if not damage.end}
 
     @property
     def complete(self) -> bool:
@@ -87,6 +93,8 @@ def verify(path: Path | str) -> Verification:
     _check_samples(found)
     notes = found.run.notes()
     _check_end(found, notes)
+    _check_order(found)
+    _check_metadata(found)
     _check_reception(found, notes, numberings)
     return found
 
@@ -133,19 +141,12 @@ def _check_files(found: Verification) -> None:
             found.lose(f'{path.name} has no sound summary: readers that need one refuse it.')
         elif not body_is_sound(path, summary):
             found.lose(f'{path.name} is not, byte for byte, what was written.')
-    described = found.run.path / FILE_NAME
-    if not found.run.path.is_dir():
-        return
-    try:
-        metadata = yaml.safe_load(described.read_text(encoding='utf-8'))
-        listed = metadata['rosbag2_bagfile_information']['relative_file_paths']
-        there = {path.name for path in found.run.files}
-        missing = sorted({Path(name).name for name in listed} - there)
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError):
-        found.lose(f'{described} is missing or damaged.')
-        return
-    for name in missing:
-        found.lose(f'{name} is missing, though {FILE_NAME} names it.')
+    if found.run.path.is_dir():
+        folder = run_folder(found.run.path)
+        if folder.metadata is None:
+            found.lose(f'{found.run.path / FILE_NAME} is missing or damaged.')
+        for name in folder.strangers:
+            found.remark(f'{name} is in the folder, and of another run: it was not looked at.')
 
 
 def _check_samples(found: Verification) -> None:
@@ -193,16 +194,53 @@ def _check_end(found: Verification, notes: list[Note]) -> None:
     if ours and (not ends or len(ends) < len(found.run.files) or ends[-1].get('next')):
         last = max((count.last for count in found.samples.values()), default=math.nan)
         where = '' if math.isnan(last) else f', the last sample is of {last:.6f} s'
+        found.finished = False
         found.lose(f'The recorder did not finish: what came at the end is not there{where}.')
-    for values in ends:
-        name = values.get('next', '')
-        if name and name not in {path.name for path in found.run.files}:
-            found.lose(f'{name} is missing, in which the run went on.')
     for note in notes:
         if note.name == RECOVERED:
             found.lose(f'This run was recovered from {note.values.get("from", "another")}.')
             for text in _values(note, 'damage') or ():
                 found.lose(f'Before the recovery: {text}')
+
+
+def _check_order(found: Verification) -> None:
+    """That each file goes on in the next, as its writer noted at its end."""
+    files = found.run.files
+    for path, following in zip(files, (*files[1:], None), strict=True):
+        nexts = [note.values.get('next', '') for note in _notes_of(path) if note.name == CLOSED]
+        name = following.name if following else ''
+        if not nexts or nexts[-1] == name or nexts[-1] in found.missing:
+            continue
+        if nexts[-1] and not following:
+            found.lose(f'{nexts[-1]} is missing, in which the run went on.')
+        else:
+            goes_on = f'goes on in {nexts[-1]}' if nexts[-1] else 'is the last'
+            found.lose(f'{path.name} {goes_on}, and here {name} follows: names were changed.')
+
+
+def _notes_of(path: Path) -> list[Note]:
+    return list(RecordedFile(path, lambda _damage: None).notes())
+
+
+def _check_metadata(found: Verification) -> None:
+    """That metadata.yaml counts what is there; of a run that was not finished it may be older."""
+    if not found.run.path.is_dir() or not found.finished:
+        return
+    metadata = run_folder(found.run.path).metadata or {}
+    told: dict[str, int] = {}
+    try:
+        for entry in metadata.get('topics_with_message_count') or ():
+            name = str(entry['topic_metadata']['name'])
+            told[name] = told.get(name, 0) + int(entry['message_count'])
+    except (KeyError, TypeError, ValueError):
+        found.lose(f'{FILE_NAME} does not count the messages of each topic.')
+        return
+    for name in sorted({*told, *found.messages} if metadata else ()):
+        if told.get(name, 0) != found.messages[name]:
+            found.lose(
+                f'{FILE_NAME} counts {told.get(name, 0)} messages of {name}, and '
+                f'{found.messages[name]} are there.'
+            )
 
 
 def _check_reception(

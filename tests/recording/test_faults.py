@@ -166,19 +166,6 @@ def test_a_run_whose_recorder_was_killed_says_where_it_ends(
     assert [finding.text for finding in verify(tmp_path / 'run').findings] == [said]
 
 
-def test_a_missing_piece_of_a_split_run_is_found(tmp_path: Path) -> None:
-    with RunWriter(tmp_path / 'run') as writer:
-        writer.add_topic(topic('/numbers'))
-        for k in range(3):
-            writer.write('/numbers', number(k), log_time=START + k, publish_time=START)
-            if k < 2:
-                writer.split()
-    (tmp_path / 'run' / 'run_1.mcap').unlink()
-    assert 'run_1.mcap is missing, though metadata.yaml names it.' in [
-        finding.text for finding in verify(tmp_path / 'run').findings
-    ]
-
-
 def test_a_run_of_another_recorder_is_verified_and_read_too(
     blocks: list[Array], tmp_path: Path
 ) -> None:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recording.conftest import topic
 
 from lathe_chatter.changes import BEGINNING, BEGINNING_AGAIN, change_sentence, knock_sentence
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe_parameters import lathe_from, parameters_of
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine, Mode
-from lathe_chatter.recording import LatheRun, Resimulation, read_run, resimulate
+from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
 from lathe_chatter.recording.identity import IDENTITY, identity
 
 TICK = 20
@@ -158,3 +159,87 @@ def test_a_run_of_other_software_is_not_called_altered(tmp_path: Path) -> None:
     there = again(tmp_path / 'there')
     assert there.difference == here.difference
     assert there.obstacle.startswith('It was computed by other software: core of yesterday and ')
+
+
+def test_a_change_that_may_be_in_a_gap_is_no_alteration(tmp_path: Path) -> None:
+    """The samples about the change are missing, and its sentence too."""
+    lathe = VirtualLathe()
+    with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
+        run.tell(BEGINNING)
+        run.take(lathe.advance(400))
+        lathe.advance(200)
+        lathe.retune(lathe.cut.with_changes(depth_of_cut=0.0008))
+        lathe.advance(200)
+        run.take(lathe.advance(400))
+    found = again(tmp_path / 'run')
+    assert found.compared == 400
+    assert found.difference is not None
+    assert found.difference.time == 801 / 1e4
+    assert found.obstacle.startswith('Samples are missing before it')
+
+
+def test_without_a_log_a_changed_cut_is_no_alteration(tmp_path: Path) -> None:
+    lathe = VirtualLathe()
+    with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
+        run.take(lathe.advance(400))
+        lathe.retune(lathe.cut.with_changes(depth_of_cut=0.0008))
+        run.take(lathe.advance(400))
+    found = again(tmp_path / 'run')
+    assert found.compared == 400
+    assert found.obstacle.startswith('The record has nothing of the log of the lathe')
+
+
+def test_two_lathes_in_one_run_are_judged_each_by_its_own_record(tmp_path: Path) -> None:
+    runs: dict[str, VirtualLathe] = {
+        '/cell1/lathe': VirtualLathe(cut=Cut(force_noise=1e-3), seed=1),
+        '/cell2/lathe': VirtualLathe(cut=Cut(depth_of_cut=0.0007)),
+    }
+    for name, lathe in runs.items():
+        with LatheRun(tmp_path / name[1:6], parameters_of(lathe), name=name) as run:
+            run.tell(BEGINNING)
+            for k in range(20):
+                if k == 7:
+                    deeper = lathe.cut.with_changes(depth_of_cut=lathe.cut.depth_of_cut + 1e-4)
+                    run.tell(change_sentence(lathe.time, lathe.cut, deeper))
+                    lathe.retune(deeper)
+                samples = lathe.advance(TICK)
+                samples[3, 4] += 1e-18 * (name == '/cell2/lathe' and k == 9)
+                run.take(samples)
+    with RunWriter(tmp_path / 'both') as writer:
+        for cell in ('cell1', 'cell2'):
+            one = read_run(tmp_path / cell)
+            for note in one.notes():
+                if note.name.startswith('lathe_chatter/parameters') or note.name == IDENTITY:
+                    writer.note(note.name, note.values)
+            for raw in one.raw_messages():
+                writer.add_topic(topic(raw.topic, raw.type))
+                writer.write(
+                    raw.topic, raw.data, log_time=raw.log_time, publish_time=raw.publish_time
+                )
+    first, second = resimulate(read_run(tmp_path / 'both'))
+    assert first == Resimulation('/cell1/lathe/samples', compared=20 * TICK)
+    assert second.difference is not None
+    assert second.compared == 9 * TICK + 3
+    assert second.difference.column == 'workpiece_displacement'
+
+
+def test_what_happens_between_two_resets_or_in_a_pause_is_no_obstacle(tmp_path: Path) -> None:
+    """A pause stops simulated time; what is changed meanwhile has the time at which it stopped."""
+    lathe = VirtualLathe(cut=Cut(sensor_noise=1e-8), seed=2)
+    parameters = parameters_of(lathe)
+    with LatheRun(tmp_path / 'run', parameters) as run:
+        run.tell(BEGINNING)
+        run.take(lathe.advance(200))
+        for depth in (0.0008, 0.0004, 0.0006):  # while paused, one after the other
+            changed = lathe.cut.with_changes(depth_of_cut=depth)
+            run.tell(change_sentence(lathe.time, lathe.cut, changed))
+            lathe.retune(changed)
+        run.take(lathe.advance(200))
+        for _ in range(3):  # reset, and reset again before a sample came
+            run.tell(BEGINNING_AGAIN)
+            lathe = lathe_from({**parameters, 'depth_of_cut': 0.0006})
+        run.take(lathe.advance(100))
+        run.tell(BEGINNING_AGAIN)
+        lathe = lathe_from({**parameters, 'depth_of_cut': 0.0006})
+        run.take(lathe.advance(300))
+    assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=800)

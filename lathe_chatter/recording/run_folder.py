@@ -1,0 +1,92 @@
+"""Which files of a folder make a run: by their names, and by metadata.yaml."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.recording.metadata import FILE_NAME
+
+_NUMBERED = re.compile(r'^(?P<run>.*)_(?P<number>\d+)$')
+_UNREADABLE = (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError)
+"""What reading a metadata.yaml raises that is not there, or is no such thing."""
+
+
+class RunReadError(LatheChatterError):
+    """A path that holds no run that can be read; the text says why."""
+
+
+class RunFolder(NamedTuple):
+    """The files of a run.
+
+    Attributes:
+        files: Those that are there, in order.
+        missing: Names of those that are not, though others tell of them.
+        strangers: Names of MCAP files in the folder that are of no file's run.
+        metadata: What metadata.yaml says of the run; None where it is missing or damaged.
+    """
+
+    files: tuple[Path, ...]
+    missing: tuple[str, ...]
+    strangers: tuple[str, ...]
+    metadata: dict[str, Any] | None
+
+
+def run_folder(folder: Path) -> RunFolder:
+    """Look for a run.
+
+    metadata.yaml has the last word on which files are of the run; one more that continues their
+    numbers may have been begun a moment before its writer was killed.
+
+    Raises:
+        RunReadError: If there is no run, or there are several and nothing says which is meant.
+    """
+    if not folder.is_dir():
+        raise RunReadError(f'{folder} does not exist.')
+    there = sorted((file for file in folder.glob('*.mcap') if file.is_file()), key=_split)
+    if not there:
+        raise RunReadError(f'{folder} holds no recorded run.')
+    metadata, listed = _described(folder)
+    runs = {_split(Path(name))[0] for name in listed} or {_split(file)[0] for file in there}
+    if not listed and len(runs) > 1:
+        names = ', '.join(sorted(runs))
+        raise RunReadError(f'{folder} holds files of several runs, {names}: name a file.')
+    files = [file for file in there if file.name in listed or _split(file)[0] in runs]
+    places = {name: place for place, name in enumerate(listed)}
+    files.sort(key=lambda file: places.get(file.name, len(places)))  # others keep their order
+    if not files:
+        raise RunReadError(f'{folder} holds none of the files that {FILE_NAME} names.')
+    strangers = tuple(file.name for file in there if file not in files)
+    return RunFolder(tuple(files), _missing(files, listed), strangers, metadata)
+
+
+def _described(folder: Path) -> tuple[dict[str, Any] | None, list[str]]:
+    """What metadata.yaml says, and the names of files among it."""
+    try:
+        text = (folder / FILE_NAME).read_text(encoding='utf-8')
+        found = yaml.safe_load(text)['rosbag2_bagfile_information']
+        return dict(found), [Path(name).name for name in found['relative_file_paths']]
+    except _UNREADABLE:
+        return None, []
+
+
+def _missing(files: Sequence[Path], listed: Sequence[str]) -> tuple[str, ...]:
+    """Names that metadata.yaml has, and numbers that are left out."""
+    names = {file.name for file in files}
+    missing = {name for name in listed if name not in names}
+    numbered = [_split(Path(name)) for name in (*names, *listed) if _NUMBERED.match(name[:-5])]
+    first = min((number for _, number in numbered), default=0) if listed else 0
+    for run, last in numbered:
+        missing |= {f'{run}_{k}.mcap' for k in range(first, last)} - names
+    return tuple(sorted(missing, key=lambda name: _split(Path(name))))
+
+
+def _split(file: Path) -> tuple[str, int]:
+    """The name of the run of a file, and its place among the pieces."""
+    match = _NUMBERED.match(file.stem)
+    return (match['run'], int(match['number'])) if match else (file.stem, 0)
