@@ -78,7 +78,8 @@ def quintic_at(
 ) -> tuple[float, float, float]:  # fmt: skip
     """S, dS/dphi and d2S/dphi2 at `angle` on the quintic with these values at two angles."""
     width = angle1 - angle0
-    place = (angle - angle0) / width
+    per_width = 1.0 / width
+    place = (angle - angle0) * per_width
     d0 = slope0 * width
     e0 = curvature0 * width * width
     rise = height1 - height0 - d0 - 0.5 * e0
@@ -90,7 +91,7 @@ def quintic_at(
     height = height0 + place * (d0 + place * (0.5 * e0 + place * (c3 + place * (c4 + place * c5))))
     slope = d0 + place * (e0 + place * (3.0 * c3 + place * (4.0 * c4 + place * 5.0 * c5)))
     curvature = e0 + place * (6.0 * c3 + place * (12.0 * c4 + place * 20.0 * c5))
-    return height, slope / width, curvature / (width * width)
+    return height, slope * per_width, curvature * (per_width * per_width)
 
 
 @compiled(inline=True, borrows=True)
