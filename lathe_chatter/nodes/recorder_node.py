@@ -166,11 +166,19 @@ class RecorderNode(ParameterNode):
         return f'{writer.folder} holds {count} messages, and {lost} were lost on the way.'
 
     def destroy_node(self) -> None:
-        """Finish the run before the node goes."""
+        """Finish the run before the node goes.
+
+        Raises:
+            RecordingFailedError: If its end is not on disk.
+        """
+        failed = False
         if self._writer is not None:
             said = self.stop()
-            self.get_logger().info(said)
+            failed = bool(self._failure)
+            (self.get_logger().error if failed else self.get_logger().info)(said)
         super().destroy_node()
+        if failed:
+            raise RecordingFailedError(self._failure)
 
     # -- what comes ------------------------------------------------------------------------
 
@@ -267,8 +275,9 @@ class RecorderNode(ParameterNode):
         return response
 
     def _on_stop(self, _request: Any, response: Any) -> Any:
-        response.success = self._writer is not None
+        recorded = self._writer is not None
         response.message = self.stop()
+        response.success = recorded and not self._failure
         return response
 
     def _on_split(self, _request: Any, response: Any) -> Any:

@@ -115,10 +115,12 @@ def run_node(
         sys.stderr.write(f'{error}\n')
         raise SystemExit(2) from None
     finally:
-        if node is not None:
-            _deliver(node)
-            node.destroy_node()
-        rclpy.try_shutdown()
+        try:
+            if node is not None:
+                _deliver(node)
+                node.destroy_node()
+        finally:
+            rclpy.try_shutdown()
 
 
 def _deliver(node: Node) -> None:

@@ -56,12 +56,14 @@ class Recorded(NamedTuple):
         log_time: When it was received, ns since the epoch.
         sequence: Its number among those of its publisher.
         message: As rosbags decodes it.
+        publish_time: When it was published, ns since the epoch.
     """
 
     topic: str
     log_time: int
     sequence: int
     message: Any
+    publish_time: int
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class Run:
                 store.register(get_types_from_msg(definition, raw.type))
                 known.add(raw.type)
             message = store.deserialize_cdr(raw.data, raw.type)
-            yield Recorded(raw.topic, raw.log_time, raw.sequence, message)
+            yield Recorded(raw.topic, raw.log_time, raw.sequence, message, raw.publish_time)
 
     def sample_blocks(self, topic: str | None = None) -> Iterator[Blocks]:
         """The samples of a lathe as they were recorded, some 4 s at a time.

@@ -21,7 +21,7 @@ from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Integers
 from lathe_chatter.recording.identity import IDENTITY, core_identity
 from lathe_chatter.recording.reader import Run, RunReadError
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks
-from lathe_chatter.recording.told import Act, Told, told_by
+from lathe_chatter.recording.told import Told, told_by
 from lathe_chatter.recording.verify import Finding
 
 _AT_ONCE = 50_000
@@ -173,27 +173,35 @@ class _Replay:
         self.logged = told.logged
         self._told = told
         self._act = -1
-        self._place: int | None = None
+        self._waiting: list[Change | Knock] = []
         self._lathe = lathe_from(told.parameters)
-        self._begin(self._lathe.cut)
 
-    def _begin(self, cut: Cut) -> None:
-        """Begin the next act at time zero."""
+    def _begin(self, published: int) -> None:
+        """Begin the act of a block, at time zero, with the cut that those before it left.
+
+        Args:
+            published: When the block was, ns since the epoch: acts may have passed without one.
+        """
+        acts, cut = self._told.acts, self._lathe.cut
+        for happened in self._waiting:  # no sample came after these
+            cut = _after(cut, happened)
         self._act += 1
-        if self._act >= len(self._told.acts):
+        while self._act + 1 < len(acts) and acts[self._act + 1].begun <= published:
+            for happened in acts[self._act].happenings:
+                cut = _after(cut, happened)
+            self._act += 1
+        if self._act >= len(acts):
             raise _CannotError(
                 'Simulated time goes back, and the record does not say how the lathe began again.'
             )
-        act: Act = self._told.acts[self._act]
-        if self._act and act.beginning != BEGINNING_AGAIN:
+        if self._act and acts[self._act].beginning != BEGINNING_AGAIN:
             raise _CannotError(
                 'The lathe was started a second time, and with what parameters is not recorded.'
             )
-        if self._act:
-            values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
-            self._lathe = lathe_from({**self._told.parameters, **values})
-        self.whole = bool(act.beginning)
-        self._waiting = list(act.happenings)
+        values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
+        self._lathe = lathe_from({**self._told.parameters, **values})
+        self.whole = bool(acts[self._act].beginning)
+        self._waiting = list(acts[self._act].happenings)
 
     def compare(self, blocks: Blocks) -> Difference | None:
         """Compare the blocks of some messages with what the lathe does; the first difference."""
@@ -214,15 +222,18 @@ class _Replay:
         places = _places(blocks, self._lathe.sample_rate)
         breaks = np.flatnonzero(places[1:] != places[:-1] + blocks.rows[:-1]) + 1
         for first, last in _spans(len(places), breaks):
-            self._go_to(int(places[first]))
+            self._go_to(int(places[first]), int(blocks.publish_times[first]))
             yield blocks.samples[begins[first] : ends[last]]
 
-    def _go_to(self, place: int) -> None:
-        """Have the lathe where the next sample is number `place`, counted from 0."""
-        if place < self._lathe.samples_taken:
-            for happened in self._waiting:  # no sample came after these
-                self._do(happened)
-            self._begin(self._lathe.cut)
+    def _go_to(self, place: int, published: int) -> None:
+        """Have the lathe where the next sample is number `place`, counted from 0.
+
+        Args:
+            place: Of the sample.
+            published: When it was, ns since the epoch.
+        """
+        if self._act < 0 or place < self._lathe.samples_taken:
+            self._begin(published)
         while self._lathe.samples_taken < place:
             self.after_gap = self.compared > 0
             self._cut(min(place - self._lathe.samples_taken, _AT_ONCE))
@@ -267,7 +278,12 @@ class _Replay:
         if isinstance(happened, Knock):
             self._lathe.knock(happened.impulse)
         else:
-            self._lathe.retune(self._lathe.cut.with_changes(**happened.new))
+            self._lathe.retune(_after(self._lathe.cut, happened))
+
+
+def _after(cut: Cut, happened: Change | Knock) -> Cut:
+    """A cut after what happened to it."""
+    return cut.with_changes(**happened.new) if isinstance(happened, Change) else cut
 
 
 def _places(blocks: Blocks, sample_rate: float) -> Integers:

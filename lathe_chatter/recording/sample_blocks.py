@@ -46,12 +46,14 @@ class Blocks(NamedTuple):
         samples: Of all blocks (n, k).
         rows: Samples in each block (blocks,).
         log_times: When each was received, ns (blocks,).
+        publish_times: When each was published, ns (blocks,).
     """
 
     columns: tuple[str, ...]
     samples: Array
     rows: Integers
     log_times: Integers
+    publish_times: Integers
 
 
 def layout_of(data: bytes) -> Layout:
@@ -113,6 +115,7 @@ def blocks_of(messages: Messages) -> Iterator[Blocks]:
             numbers.view('<f8').reshape(-1, len(layout.columns)),
             np.full(count, layout.rows),
             messages.heads['log_time'][chosen].astype(np.int64),
+            messages.heads['publish_time'][chosen].astype(np.int64),
         )
         begun += count
 

@@ -27,10 +27,12 @@ class Act:
 
     Attributes:
         beginning: The sentence of its time zero, empty where the record has none.
+        begun: When that was published, ns since the epoch.
         happenings: Changes and knocks in the order in which they took effect.
     """
 
     beginning: str = ''
+    begun: int = 0
     happenings: list[Change | Knock] = field(default_factory=list)
 
 
@@ -78,7 +80,7 @@ def _acts(run: Run, lathe: str) -> list[Act]:
         if sentence in (BEGINNING, BEGINNING_AGAIN):
             if acts[-1].beginning or acts[-1].happenings:
                 acts.append(Act())
-            acts[-1].beginning = sentence
+            acts[-1].beginning, acts[-1].begun = sentence, recorded.publish_time
             continue
         happened = parse_change(sentence) or parse_knock(sentence)
         if happened is not None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from bench import Bench
 from diagnostic_msgs.msg import DiagnosticArray
@@ -231,6 +236,68 @@ def test_a_full_disk_ends_it_with_a_sentence_and_exit_1(
     assert err.splitlines()[-1].endswith('the recording ends, complete up to here.')
     assert 'Traceback' not in err
     assert read_run(tmp_path / 'run').topics == {}
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 1 MB, at the place where the run will be."""
+    place = tmp_path / 'disk'
+    place.mkdir()
+    command = ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(place)]
+    if os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip('only root can mount a small disk')
+    yield place
+    subprocess.run(['umount', '-l', str(place)], check=True)
+
+
+def test_a_disk_that_fills_up_ends_it_with_its_last_good_state(
+    recorder_process: Any, small_disk: Path, bench: Bench, spin_until: Any
+) -> None:
+    publisher = bench.node.create_publisher(Float64MultiArray, '/n', KEPT)
+    process = recorder_process(f'output:={small_disk / "run"}', 'min_free_space:=0')
+    told = bench.listen(DiagnosticArray, '/diagnostics')
+    noise = np.random.default_rng(1).standard_normal((400, 1000))
+    sent = iter(range(len(noise)))
+
+    def ended() -> bool:
+        for k in islice(sent, 10 if publisher.get_subscription_count() else 0):
+            publisher.publish(Float64MultiArray(data=noise[k].tolist()))
+        return process.poll() is not None
+
+    spin_until(ended, 'the end of the recorder')
+    assert process.returncode == 1
+    said = process.stderr.read().splitlines()[-1]
+    assert os.strerror(errno.ENOSPC) in said
+    spin_until(
+        lambda: any(said.rstrip() in status.message for array in told for status in array.status),
+        'the diagnostic',
+    )
+    found = [recorded.message.data for recorded in read_run(small_disk / 'run').messages('/n')]
+    assert 0 < len(found) < 130  # of 8 kB
+    assert np.array(found).tobytes() == noise[: len(found)].tobytes()
+
+
+def test_an_end_that_is_not_on_disk_is_exit_1(
+    recorder_process: Any, small_disk: Path, bench: Bench, spin_until: Any
+) -> None:
+    publisher = bench.node.create_publisher(Float64, '/n', KEPT)
+    process = recorder_process(f'output:={small_disk / "run"}', 'min_free_space:=0')
+    file = small_disk / 'run' / 'run_0.mcap'
+    spin_until(lambda: publisher.get_subscription_count() == 1, 'the recorder')
+    publisher.publish(Float64(data=1.0))
+    spin_until(lambda: file.exists() and list(read_run(file).messages('/n')), 'a message on disk')
+    with (small_disk / 'filler').open('wb', buffering=0) as filler, suppress(OSError):
+        while filler.write(bytes(4096)):
+            pass
+    for k in range(2000):
+        publisher.publish(Float64(data=float(k)))
+    publisher.wait_for_all_acked()
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert 'Traceback' not in err
+    assert os.strerror(errno.ENOSPC) in err.splitlines()[-1]
+    assert next(read_run(file).messages('/n')).message.data == 1.0
 
 
 def test_a_killed_recorder_leaves_all_but_the_last_moment(

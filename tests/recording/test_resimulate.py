@@ -235,11 +235,29 @@ def test_what_happens_between_two_resets_or_in_a_pause_is_no_obstacle(tmp_path: 
             run.tell(change_sentence(lathe.time, lathe.cut, changed))
             lathe.retune(changed)
         run.take(lathe.advance(200))
-        for _ in range(3):  # reset, and reset again before a sample came
+        for depth in (0.0005, 0.0009, 0.0007):  # reset, changed and reset before a sample came
             run.tell(BEGINNING_AGAIN)
-            lathe = lathe_from({**parameters, 'depth_of_cut': 0.0006})
+            changed = lathe.cut.with_changes(depth_of_cut=depth)
+            run.tell(change_sentence(0.0, lathe.cut, changed))
+            lathe = lathe_from({**parameters, 'depth_of_cut': depth})
         run.take(lathe.advance(100))
         run.tell(BEGINNING_AGAIN)
-        lathe = lathe_from({**parameters, 'depth_of_cut': 0.0006})
-        run.take(lathe.advance(300))
+        lathe = lathe_from({**parameters, 'depth_of_cut': 0.0007})
+        run.take(lathe.advance(100))
+        run.tell(change_sentence(lathe.time, lathe.cut, Cut(sensor_noise=1e-8)))
+        lathe.retune(Cut(sensor_noise=1e-8))
+        run.take(lathe.advance(200))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=800)
+
+
+def test_a_reset_before_the_first_sample_that_was_recorded(tmp_path: Path) -> None:
+    lathe = VirtualLathe(cut=Cut(force_noise=1e-3))
+    deeper = lathe.cut.with_changes(depth_of_cut=0.0008)
+    with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
+        run.tell(BEGINNING)
+        run.tell(change_sentence(0.3, lathe.cut, deeper))
+        run.tell(BEGINNING_AGAIN)
+        lathe = VirtualLathe(cut=deeper)
+        lathe.advance(60)  # not recorded either
+        run.take(lathe.advance(100))
+    assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=100)
