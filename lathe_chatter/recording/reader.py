@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from lathe_chatter.recording.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.frames import to_pandas, to_xarray
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
-from lathe_chatter.recording.run_folder import RunReadError, run_folder
+from lathe_chatter.recording.run_folder import RunFolder, RunReadError, run_folder
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
 from lathe_chatter.recording.sample_columns import Cut, cut_of
 from lathe_chatter.recording.sample_cuts import cuts_by_index
@@ -75,12 +75,14 @@ class Run:
         files: The MCAP files in order.
         damaged: Whether what is left of damaged files is wanted; else they raise.
         damage: What could not be read so far, where `damaged`.
+        folder: What its folder holds; None where it is one file.
     """
 
     path: Path
     files: tuple[Path, ...]
     damaged: bool = False
     damage: list[Damage] = field(default_factory=list)
+    folder: RunFolder | None = None
 
     @cached_property
     def topics(self) -> dict[str, str]:
@@ -309,4 +311,4 @@ def read_run(path: Path | str, *, damaged: bool = False) -> Run:
     if absent and not damaged:
         names = ', '.join(found.missing)
         raise RunReadError(f'{path} lacks {names}. {_REST}')
-    return Run(path, found.files, damaged, absent)
+    return Run(path, found.files, damaged, absent, found)

@@ -13,6 +13,7 @@ from lathe_chatter.recording.background import Background
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.open_chunk import OpenChunk
 from lathe_chatter.recording.run_files import CLOSED, DiskFullError, RunExistsError, RunFiles
+from lathe_chatter.recording.tally import Tally
 from lathe_chatter.recording.topic_records import TopicTable
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
@@ -58,6 +59,7 @@ class RunWriter:
             split_duration=split_duration,
             split_size=split_size,
         )
+        self._tally = Tally(folder)
         self._topics = TopicTable()
         self._chunk = OpenChunk(self._topics.described)
         self._closed = False
@@ -81,8 +83,9 @@ class RunWriter:
             publish_time: When it was published, ns since the epoch.
             sequence: Its number among those of its publisher.
         """
-        chunk = self._chunk
-        chunk.add_message(self._topics.numbers[name], log_time, publish_time, sequence, data)
+        chunk, channel = self._chunk, self._topics.numbers[name]
+        chunk.add_message(channel, log_time, publish_time, sequence, data)
+        self._tally.count(channel, log_time)
         if chunk.size > _CHUNK_SIZE:
             self._send_chunk()
 
@@ -145,10 +148,13 @@ class RunWriter:
             return
         self._closed = True
         self._send_chunk()
+        finished = False
         try:
             self._background.now(self._files.close)
+            finished = True
         finally:
             self._background.end()
+            self._tally.close(finished=finished)
 
     def abandon(self) -> None:
         """Leave everything as the last commit left it: the disk takes no more."""
@@ -157,6 +163,7 @@ class RunWriter:
         self._closed = True
         self._background.now(self._files.abandon)
         self._background.end()
+        self._tally.close(finished=False)
 
     def __enter__(self) -> RunWriter:  # noqa: PYI034 -- Self needs Python 3.11
         """The folder and its first file are there."""

@@ -324,4 +324,4 @@ def test_a_killed_recorder_leaves_all_but_the_last_moment(
     assert found == [float(k) for k in range(len(found))]
     assert 10 <= len(found) <= 20
     losses = [finding.text for finding in verify(run).findings if finding.loss]
-    assert losses == ['The recorder did not finish: what came at the end is not there.']
+    assert losses[-1].startswith('The recorder did not finish')

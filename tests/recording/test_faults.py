@@ -160,7 +160,7 @@ def test_a_run_whose_recorder_was_killed_says_where_it_ends(
     writer.commit()
     writer.abandon()
     said = (
-        'The recorder did not finish: what came at the end is not there, the last sample is of '
+        'The recorder did not finish: all that it had taken is there, the last sample is of '
         '0.002000 s.'
     )
     assert [finding.text for finding in verify(tmp_path / 'run').findings] == [said]

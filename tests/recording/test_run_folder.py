@@ -112,7 +112,7 @@ def test_the_files_of_another_run_are_left_out(folder: Path, tmp_path: Path) -> 
         read_run(folder)
 
 
-@pytest.mark.parametrize('text', ['', ': : [', '- a\n- b\n', 'a: 5', '[' * 5000, '\0'])
+@pytest.mark.parametrize('text', ['', ': : [', '- a\n- b\n', 'a: 5', '[' * 900, '\0'])
 def test_a_damaged_metadata_file_is_a_finding_and_no_obstacle(text: str, folder: Path) -> None:
     (folder / 'metadata.yaml').write_text(text)
     assert losses(folder) == [f'{folder}/metadata.yaml is missing or damaged.']

@@ -1,0 +1,125 @@
+"""Whether all files of a run are there, in order, whole, and as their writer left them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lathe_chatter.recording.identity import IDENTITY, RECOVERED
+from lathe_chatter.recording.metadata import FILE_NAME
+from lathe_chatter.recording.recorded_file import Note, RecordedFile
+from lathe_chatter.recording.run_files import CLOSED
+from lathe_chatter.recording.summary import body_is_sound, read_summary
+from lathe_chatter.recording.tally import FILE_NAME as UNFINISHED
+from lathe_chatter.recording.tally import Taken, taken
+from lathe_chatter.recording.verification import Verification
+
+
+def check_files(found: Verification) -> None:
+    """Every file to its last byte, and that none is missing."""
+    for damage in found.run.damage:
+        found.lose(str(damage))
+    for path in found.run.files:
+        summary = read_summary(path)
+        if summary is None:
+            found.lose(f'{path.name} has no sound summary: readers that need one refuse it.')
+        elif not body_is_sound(path, summary):
+            found.lose(f'{path.name} is not, byte for byte, what was written.')
+    folder = found.run.folder
+    if folder is not None:
+        if folder.metadata is None:
+            found.lose(f'{found.run.path / FILE_NAME} is missing or damaged.')
+        for name in folder.strangers:
+            found.remark(f'{name} is in the folder, and of another run: it was not looked at.')
+
+
+def check_end(found: Verification, notes: list[Note]) -> None:
+    """That the recorder finished, and all its files are there."""
+    counts = taken(found.run.path) if found.run.folder else {}
+    ours = (found.run.path / UNFINISHED).exists() or any(n.name == IDENTITY for n in notes)
+    ends = [note.values for note in notes if note.name == CLOSED]
+    if ours and (not ends or len(ends) < len(found.run.files) or ends[-1].get('next')):
+        found.finished = False
+        _say_what_is_lost(found, counts)
+    for note in notes:
+        if note.name == RECOVERED:
+            found.lose(f'This run was recovered from {note.values.get("from", "another")}.')
+            for text in noted(note, 'damage') or ():
+                found.lose(f'Before the recovery: {text}')
+
+
+def _say_what_is_lost(found: Verification, counts: Mapping[int, Taken]) -> None:
+    """What a recorder that did not finish had taken, and is not there."""
+    names: dict[int, str] = {}
+    for path in found.run.files:
+        known = RecordedFile(path, lambda _damage: None).known
+        names |= {number: channel.topic for number, channel in known.channels.items()}
+    before = len(found.findings)
+    for channel, (messages, last) in sorted(counts.items()):
+        name = names.get(channel, '')
+        lost = messages - found.messages[name]
+        if lost <= 0:
+            continue
+        if name in found.last:
+            span = f'the last {(last - found.last[name]) / 1e9:.3f} s'
+            found.lose(f'{name}: {lost} messages that had come are not there, {span}.')
+        else:
+            named = name or 'a topic that is not there either'
+            found.lose(f'{named}: none of the {lost} messages that had come are there.')
+    what = 'what came at the end is not there'
+    if counts and len(found.findings) == before:
+        what = 'all that it had taken is there'
+    end = max((count.last for count in found.samples.values()), default=math.nan)
+    where = '' if math.isnan(end) else f', the last sample is of {end:.6f} s'
+    found.lose(f'The recorder did not finish: {what}{where}.')
+
+
+def check_order(found: Verification) -> None:
+    """That each file goes on in the next, as its writer noted at its end."""
+    files = found.run.files
+    for path, following in zip(files, (*files[1:], None), strict=True):
+        nexts = [note.values.get('next', '') for note in _notes_of(path) if note.name == CLOSED]
+        name = following.name if following else ''
+        if not nexts or nexts[-1] == name or nexts[-1] in found.missing:
+            continue
+        if nexts[-1] and not following:
+            found.lose(f'{nexts[-1]} is missing, in which the run went on.')
+        else:
+            goes_on = f'goes on in {nexts[-1]}' if nexts[-1] else 'is the last'
+            found.lose(f'{path.name} {goes_on}, and here {name} follows: names were changed.')
+
+
+def check_metadata(found: Verification) -> None:
+    """That metadata.yaml counts what is there; of a run that was not finished it may be older."""
+    folder = found.run.folder
+    if folder is None or folder.metadata is None or not found.finished:
+        return
+    told: dict[str, int] = {}
+    try:
+        for entry in folder.metadata.get('topics_with_message_count') or ():
+            name = str(entry['topic_metadata']['name'])
+            told[name] = told.get(name, 0) + int(entry['message_count'])
+    except (KeyError, TypeError, ValueError):
+        found.lose(f'{FILE_NAME} does not count the messages of each topic.')
+        return
+    for name in sorted({*told, *found.messages}):
+        if told.get(name, 0) != found.messages[name]:
+            found.lose(
+                f'{FILE_NAME} counts {told.get(name, 0)} messages of {name}, and '
+                f'{found.messages[name]} are there.'
+            )
+
+
+def _notes_of(path: Path) -> list[Note]:
+    return list(RecordedFile(path, lambda _damage: None).notes())
+
+
+def noted(note: Note, name: str) -> Any:
+    """What a note holds as JSON; None where it is damaged, which the CRC of the body tells."""
+    try:
+        return json.loads(note.values[name])
+    except (KeyError, ValueError):
+        return None
