@@ -69,13 +69,10 @@ def _attend(g: Group, index: int, row: int) -> None:
 
 @compiled(borrows=True, apart=True)
 def _advance_together(
-    g: Group, one: Array, other: Array, figures: Array, ring: Array, steps: int, first: int,
-    until: int, columns: Integers, out: Array,
-) -> None:  # fmt: skip
-    """Cut rows `first` to `until` with the lanes that are abreast.
-
-    The arrays of the group that every step works on are named once more.
-    """
+    g: Group, steps: int, first: int, until: int, columns: Integers, out: Array
+) -> None:
+    """Cut rows `first` to `until` with the lanes that are abreast."""
+    one, other, figures, ring = g.one, g.other, g.figures, g.ring
     slot, per_turn, place = g.counters[SLOT], ring.shape[0], g.places[0]
     odd, together = g.counters[ODD] != 0, _are_together(g)
     for row in range(first, until):
@@ -169,10 +166,7 @@ def advance_abreast(g: Group, columns: Integers, samples: Array, events: Array, 
         for lane in range(LANES):
             g.rows[lane] = max(g.rows[lane], until)
         if abreast > 0:
-            _advance_together(
-                g, g.one, g.other, g.figures, g.ring, steps, until, g.counters[UNTIL], columns,
-                out,
-            )  # fmt: skip
+            _advance_together(g, steps, until, g.counters[UNTIL], columns, out)
 
 
 @compiled()
