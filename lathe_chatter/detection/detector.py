@@ -7,39 +7,44 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lathe_chatter.detection import states
-from lathe_chatter.detection.advice import better_speed
-from lathe_chatter.detection.identification import (
-    ANGULAR_FREQUENCY,
-    CUTTING,
-    GROWTH,
-    GROWTH_ERROR,
-    STIFFNESS,
-    WINDOW_OUTPUTS,
-    WINDOW_SIZE,
-    WINDOW_TOOL_POWER,
-    identify,
-    mechanics_of,
-    rightmost_in_band,
-)
-from lathe_chatter.detection.intake import Break, Hop, Intake, Rate
-from lathe_chatter.detection.kernels import band_of, design, gain
-from lathe_chatter.detection.signals import (
-    PRODUCTS_SIZE,
-    follow,
-    fresh_memory,
-)
-from lathe_chatter.detection.states import Estimate
+from lathe_chatter.detection import ledger as ledgers
+from lathe_chatter.detection.advice import Advice, advise, rule_of_thumb
+from lathe_chatter.detection.hops import HopFigures, take_hops
+from lathe_chatter.detection.identification import WINDOW_SIZE, mechanics_of
+from lathe_chatter.detection.intake import Break, Hops, Intake, Rate
+from lathe_chatter.detection.kernels import band_of, design, gain, thinning_of
+from lathe_chatter.detection.signals import PRODUCTS_SIZE, READING_SIZE, fresh_memory
+from lathe_chatter.detection.states import STATES, Estimate, Mode
 from lathe_chatter.model import Array, Machine
 
 _PAPER = Machine()
-_WINDOWS = np.array([1, 2, 4, 8, 16, 32])
-_REFERENCE = 3
-_PATIENCE = 2
+_DECAY = 16.0
+"""Of the resonators, 1/s: as narrow as the growth of chatter allows."""
+_HOP = 0.01
+"""Length of a hop, about, s: what is judged together, against the decay of the resonators."""
+_CLEAR_CONTACT = 0.15
+"""Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
+_ADVISED_AT = (0, 10, 30)
+"""Hops after the alarm at which a speed is recommended, each time with a better estimate."""
 
 
 class ChatterDetector:
-    """Flags chatter from what sensors on a machine would see."""
+    """Flags chatter from what sensors on a machine would see.
+
+    It uses the columns `tool_displacement`, `workpiece_displacement` and `spindle_angle` as far
+    as they are there (a displacement has to be), never the chip thickness or the force. Nothing
+    depends on how the samples were cut into batches.
+
+    Args:
+        machine: Tool, workpiece and bearing as an impact test would give them; None where
+            nothing is known, and growth is then read from the vibration alone.
+        speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
+        smallest_amplitude: No vibration below this is called chatter, m.
+        forced_amplitude: Vibration at multiples of the spindle speed from which on the state is
+            `forced`, m.
+        strictness: The score that makes an alarm; 1 for the figures in the README, more for
+            fewer alarms.
+    """
 
     def __init__(
         self,
@@ -47,138 +52,186 @@ class ChatterDetector:
         *,
         speed_range: tuple[float, float] = (60.0, 30000.0),
         smallest_amplitude: float = 1e-10,
+        forced_amplitude: float = 10e-6,
+        strictness: float = 1.0,
     ) -> None:
         """Begin with nothing known."""
-        self._machine = machine or _PAPER
+        self._machine = machine
         self._speed_range = speed_range
         self._smallest = smallest_amplitude
-        self._band = band_of(self._machine)
-        self._mechanics = mechanics_of(self._machine, *self._band)
+        self._forced = forced_amplitude
+        self._strictness = strictness
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, as at the start."""
         self._intake = Intake()
-        self._rate = 0.0
-        self._alarmed = False
-        self._estimate = Estimate()
-        self._guess = complex(0.0, math.pi * sum(self._band))
-        self._suspected = self._calm = 0
-        self._peak = 0.0
-        self._since_alarm = 0
+        self._forget()
 
     def update(self, samples: Array, columns: Sequence[str]) -> Estimate:
-        """Take in samples."""
+        """Take in samples.
+
+        Args:
+            samples: Rows in order of time (n, columns).
+            columns: What the columns are, as in `model.SAMPLE_COLUMNS`.
+
+        Returns:
+            What is known after the last of them.
+
+        Raises:
+            LayoutError: If there is no time or no displacement, or the shape is wrong.
+        """
         for item in self._intake.take(samples, columns):
-            if isinstance(item, Hop):
-                self._take_hop(item)
+            if isinstance(item, Hops):
+                self._take(item)
             elif isinstance(item, Rate):
-                self._prepare(item.value)
+                self._prepare(item)
             elif item is Break.RESTART:
-                intake = self._intake
-                self.reset()
-                self._intake = intake
+                self._forget()
             else:
-                self._forget_signals()
+                self._begin_stretch()
         return self._estimate
 
-    def _prepare(self, rate: float) -> None:
-        self._sample_rate = rate
-        thinning = max(1, int(rate / (9.0 * self._band.high)))
-        thinned = rate / thinning
-        stride = max(1, round(thinned / (2.25 * self._band.high)))
-        self._thinned = thinned
-        self._strides = np.array([thinning, stride])
-        self._intake.hop = thinning * stride * 5
-        self._kernels = design(self._band, thinned, self._machine)
-        self._forget_signals()
+    def _forget(self) -> None:
+        self._estimate = Estimate()
+        self._advice, self._advice_error = Advice(), math.inf
+        self._prepared: tuple[float, Mode] | None = None
+        self._hop = 1
 
-    def _forget_signals(self) -> None:
-        turn = 60.0 / self._speed_range[0] * self._thinned
-        self._memory = fresh_memory(turn, self._kernels.band.size)
-        self._products = np.zeros((64, PRODUCTS_SIZE))
-        self._motion = np.zeros(8, complex)
-        self._newest = 63
-        self._windows = np.full((_WINDOWS.size, WINDOW_SIZE), np.nan)
-        self._hops = 0
-
-    def _take_hop(self, hop: Hop) -> None:
-        self._newest = (self._newest + 1) % 64
-        self._hops += 1
-        follow(
-            hop.block,
-            self._strides,
-            self._kernels,
-            self._memory,
-            (self._products[self._newest], self._motion),
-        )
-        turned = hop.block[-1, 0] - hop.block[0, 0]
-        speed = turned / (len(hop.block) - 1) * self._sample_rate
-        if speed * 60.0 < self._speed_range[0]:
-            self._estimate = Estimate(time=hop.time, state=states.IDLE, chatter=self._alarmed)
+    def _prepare(self, rate: Rate) -> None:
+        """Get ready for a stretch with this rate and these channels."""
+        mode = Mode.of(self._machine, angle=rate.angle, workpiece=rate.workpiece)
+        if self._prepared == (rate.value, mode):
+            self._intake.hop = self._hop
             return
-        figures = np.array([1.0 / speed, 0.8, 0.0, 0.0])
-        windows = self._windows
-        identify(
-            self._products, self._newest, _WINDOWS, self._mechanics, figures, self._guess, windows
+        self._prepared, self._mode = (rate.value, mode), mode
+        machine = self._machine
+        thinning, stride = thinning_of(machine, rate.value)
+        self._thinned = rate.value / thinning
+        outputs = max(1, round(_HOP * self._thinned / stride))
+        self._hop = self._intake.hop = thinning * stride * outputs
+        self._kernels = design(machine, self._thinned, _DECAY)
+        band = band_of(machine)
+        self._mechanics = mechanics_of(machine or _PAPER, *band)
+        self._reading = np.zeros(READING_SIZE, np.int64)
+        self._reading[:] = (
+            thinning,
+            stride,
+            rate.angle,
+            rate.workpiece,
+            mode is Mode.FULL,
         )
-        if self._hops % 8 == 0 and not math.isnan(windows[_REFERENCE, GROWTH]):
-            self._guess = rightmost_in_band(
+        self._period = self._hop / rate.value
+        tool = machine.tool.stiffness if machine is not None else 0.0
+        self._figures = np.array(
+            [
+                self._period,
+                tool,
+                self._forced,
+                gain(self._kernels, self._thinned, band.middle),
+                rate.value,
+                self._speed_range[0] / 60.0,
+            ]
+        )
+        self._ledger = ledgers.fresh_ledger(self._kernels.poles.size)
+        numbers = self._ledger.numbers
+        numbers[ledgers.SMALLEST], numbers[ledgers.STRICTNESS] = self._smallest, self._strictness
+        spindle = machine.workpiece.stiffness if machine is not None else 0.0
+        self._guess = np.array([complex(0.0, 2.0 * math.pi * band.middle), 0.0, spindle])
+        self._begin_stretch()
+
+    def _begin_stretch(self) -> None:
+        """After a gap: no signal reaches across it, the alarm and what is usual do."""
+        if self._prepared is None:
+            return
+        turn = self._thinned / max(self._figures[HopFigures.SLOWEST], 0.5)
+        self._memory = fresh_memory(turn, self._kernels)
+        self._products = np.zeros((ledgers.HOPS, PRODUCTS_SIZE))
+        self._windows = np.full((ledgers.WINDOWS.size, WINDOW_SIZE), np.nan)
+        self._place = np.zeros(1, np.int64)
+        self._ledger.motion[:] = 0.0
+        self._ledger.speeds[:] = 0.0
+        self._ledger.flags[ledgers.SEEN] = 0
+        self._ledger.flags[ledgers.STATE] = ledgers.UNKNOWN
+
+    def _take(self, hops: Hops) -> None:
+        """Judge some hops; stop where a speed has to be recommended."""
+        done, flags = 0, self._ledger.flags
+        count = len(hops.block) // self._hop
+        while done < count:
+            done += take_hops(
+                hops.block[done * self._hop :],
+                self._hop,
+                self._reading,
+                self._kernels,
+                self._memory,
+                self._products,
+                self._windows,
                 self._mechanics,
-                max(windows[_REFERENCE, CUTTING], 0.0),
-                float(
-                    np.clip(windows[_REFERENCE, STIFFNESS], self._mechanics[5], self._mechanics[6])
-                ),
-                1.0 / speed,
+                self._figures,
                 self._guess,
+                self._place,
+                self._ledger,
             )
-        self._decide(hop.time, speed)
+            if flags[ledgers.ALARMED] == 0:
+                self._advice, self._advice_error = Advice(), math.inf
+            elif int(flags[ledgers.SINCE_ALARM]) in _ADVISED_AT:
+                self._advise()
+        self._estimate = self._told(float(hops.times[-1]))
 
-    def _decide(self, time: float, speed: float) -> None:
-        windows = self._windows
-        if not windows[0, WINDOW_OUTPUTS] >= 2:
-            self._estimate = Estimate(time=time, state=states.UNKNOWN, chatter=self._alarmed)
-            return
-        errors = np.where(np.isnan(windows[:, GROWTH_ERROR]), np.inf, windows[:, GROWTH_ERROR])
-        best = [float(value) for value in windows[int(np.argmin(errors))]]
-        omega = best[ANGULAR_FREQUENCY]
-        taps = self._kernels.band.size
-        comb = abs(1.0 - np.exp(-1j * omega / speed)) if math.isfinite(omega) else 1.0
-        amplitude = 2.0 * math.sqrt(windows[1, WINDOW_TOOL_POWER]) / max(comb, 0.1)
-        if math.isfinite(omega):
-            amplitude /= max(gain(self._band, self._thinned, taps, omega / (2 * math.pi)), 0.1)
-        with np.errstate(invalid='ignore'):
-            surely = (windows[:, GROWTH] / windows[:, GROWTH_ERROR] > 6.0) & (
-                windows[:, GROWTH] > 0.2
+    def _speed(self) -> float:
+        """rev/s; nan where the spindle is not seen."""
+        speed = float(self._ledger.speeds[0])
+        return speed if self._mode.sees_spindle else math.nan
+
+    def _seated(self) -> bool | None:
+        """Whether the bearing carries throughout, or not at all."""
+        if self._machine is None:
+            return None
+        stiffness = float(self._ledger.numbers[ledgers.FIGURE_STIFFNESS])
+        open_ = self._machine.workpiece_stiffness(seated=False)
+        part = (stiffness - open_) / max(self._machine.bearing_stiffness, 1e-9 * open_)
+        if abs(part) < _CLEAR_CONTACT:
+            return False
+        return True if abs(part - 1.0) < _CLEAR_CONTACT else None
+
+    def _advise(self) -> None:
+        numbers = self._ledger.numbers
+        rpm = 60.0 * self._speed()
+        if self._machine is not None and self._mode is Mode.FULL:
+            error = float(numbers[ledgers.FIGURE_ERROR])
+            if error >= self._advice_error:
+                return  # where the tool leaves the cut, C w looks less than it is
+            self._advice_error = error
+            cutting = float(numbers[ledgers.FIGURE_CUTTING])
+            self._advice = advise(
+                self._machine, cutting, self._speed_range, rpm, seated=self._seated()
             )
-        suspect = bool(surely.any()) and amplitude > self._smallest
-        self._suspected = self._suspected + 1 if suspect else 0
-        if self._alarmed:
-            self._since_alarm += 1
-            self._peak = max(self._peak, amplitude)
-            dead = amplitude < 0.1 * self._peak and best[GROWTH] < 0.0
-            self._calm = self._calm + 1 if dead else 0
-            if self._calm >= 20:
-                self._alarmed = False
-        elif self._suspected > _PATIENCE:
-            self._alarmed, self._peak, self._calm = True, amplitude, 0
-            self._since_alarm = 0
-        state = states.CHATTER if self._alarmed else states.WATCH if suspect else states.STABLE
-        stiffness = best[STIFFNESS]
-        open_, bearing = self._machine.workpiece.stiffness, self._machine.bearing_stiffness
-        speed_rpm = self._estimate.recommended_speed_rpm if self._alarmed else math.nan
-        if self._alarmed and self._since_alarm in {0, 10, 30}:
-            speed_rpm = better_speed(self._machine, best[CUTTING], self._speed_range, 60 * speed)
-        self._estimate = Estimate(
+        else:
+            frequency = float(numbers[ledgers.FIGURE_OMEGA]) / (2.0 * math.pi)
+            self._advice = rule_of_thumb(frequency, self._speed_range)
+
+    def _told(self, time: float) -> Estimate:
+        numbers, flags = self._ledger.numbers.tolist(), self._ledger.flags
+        stiffness = numbers[ledgers.FIGURE_STIFFNESS]
+        engaged = None
+        if self._machine is not None and math.isfinite(stiffness):
+            bearing = self._machine.bearing_stiffness
+            engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
+        return Estimate(
             time,
-            state,
-            self._alarmed,
-            best[GROWTH],
-            best[GROWTH_ERROR],
-            omega / (2 * math.pi),
-            amplitude,
-            best[CUTTING],
+            STATES[int(flags[ledgers.STATE])],
+            bool(flags[ledgers.ALARMED]),
+            self._mode,
+            numbers[ledgers.FIGURE_GROWTH],
+            numbers[ledgers.FIGURE_ERROR],
+            numbers[ledgers.FIGURE_OMEGA] / (2.0 * math.pi),
+            numbers[ledgers.AMPLITUDE],
+            self._speed() * 60.0,
+            numbers[ledgers.FIGURE_CUTTING],
             stiffness,
-            bool(stiffness > open_ + 0.1 * bearing) if math.isfinite(stiffness) else None,
-            speed_rpm,
+            engaged,
+            numbers[ledgers.RATIO],
+            numbers[ledgers.SCORE],
+            self._advice,
         )

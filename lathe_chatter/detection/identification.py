@@ -1,10 +1,10 @@
 """The cut identified in windows of several lengths, and the growth rate that follows from it.
 
-Two least squares of one unknown each: C w from F_u = C w q, and the stiffness k that carries
-the workpiece from F_u - m_wp u'' - c_wp u' = k u, both in the band and free of everything
-periodic. The rightmost root of the characteristic equation with these two numbers is the growth
-rate; its derivatives carry their standard errors over. Windows end now and differ in length:
-after a change of the cut the short ones know the new values at once.
+Two least squares of one unknown each: C w from F = C w h, and the stiffness k that carries the
+workpiece from F_u - m_wp u'' - c_wp u' = k u, both in the band, what the noise of the sensors
+adds to the sums taken off. The rightmost root of the characteristic equation with these two
+numbers is the growth rate; its derivatives carry their standard errors over. Windows end now
+and differ in length: after a change of the cut the short ones know the new values at once.
 """
 
 from __future__ import annotations
@@ -14,6 +14,12 @@ import math
 import numpy as np
 
 from lathe_chatter.compiled import compiled
+from lathe_chatter.detection.kernels import (
+    BAND_BAND,
+    FORCE_BAND,
+    INERTIA_BAND,
+)
+from lathe_chatter.detection.kernels import FORCE_FORCE as SPILL_FORCE
 from lathe_chatter.detection.signals import (
     CHIP_CHIP,
     FORCE_CHIP,
@@ -22,7 +28,6 @@ from lathe_chatter.detection.signals import (
     PRODUCTS_SIZE,
     PULL_PULL,
     PULL_WORKPIECE,
-    RELATIVE_POWER,
     TOOL_POWER,
     WORKPIECE_WORKPIECE,
 )
@@ -37,7 +42,7 @@ from lathe_chatter.model import Array, Integers, Machine
     GROWTH,
     GROWTH_ERROR,
     ANGULAR_FREQUENCY,
-    WINDOW_RELATIVE_POWER,
+    CLEARNESS,
     WINDOW_TOOL_POWER,
     WINDOW_OUTPUTS,
     WINDOW_SIZE,
@@ -55,11 +60,33 @@ from lathe_chatter.model import Array, Integers, Machine
     LOW,
     HIGH,
     MECHANICS_SIZE,
-) = range(11 - 1)
+) = range(10)
+
+# What the noise of the sensors adds to the sums of one output.
+(
+    NOISE_FORCE,
+    NOISE_FORCE_CHIP,
+    NOISE_CHIP,
+    NOISE_PULL_WORKPIECE,
+    NOISE_WORKPIECE,
+    NOISE_SIZE,
+) = range(6)
 
 _MOST_SEEDS = 32
 _STEP_LIMIT = 60.0
 """Largest Newton step, 1/s: no leap into another lobe."""
+_CORRELATION = 1.2
+"""Variance of a sum over outputs that overlap, over what independent ones would have; checked
+by `python benchmarks/detection check`."""
+_USUAL = 50.0
+"""Outputs that the usual misfit counts for beside a window's own."""
+_LEAST = 0.1
+"""Part of a sum that the noise of the sensors leaves at least."""
+_MODEL_ERROR = 1e-3
+"""Misfit of a machine that is known to three digits, as a part of the force."""
+_REFERENCE = 2
+_AGREEMENT = 4.0
+"""Standard errors within which a longer window tells the same stiffness."""
 
 
 def mechanics_of(machine: Machine, low: float, high: float) -> Array:
@@ -131,9 +158,70 @@ def rightmost_in_band(
 
 
 @compiled()
+def _at(row: Array, lag: float) -> float:
+    """A correlation at a lag between samples."""
+    middle = row.size // 2
+    if abs(lag) >= middle - 1:
+        return 0.0
+    place = int(np.floor(lag + middle))
+    x = lag + middle - place
+    value: float = (1.0 - x) * row[place] + x * row[place + 1]
+    return value
+
+
+@compiled()
+def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: Array) -> None:
+    """What white noise of the thinned samples adds to the sums of one output.
+
+    Args:
+        spill: From `kernels.Kernels`.
+        tool: Variance of the noise of the tool's thinned samples, m2.
+        workpiece: The same of the workpiece.
+        turn: Thinned samples a turn.
+        noise: Written (NOISE_SIZE,).
+    """
+    change = 2.0 * (_at(spill[BAND_BAND], 0.0) - _at(spill[BAND_BAND], turn))
+    noise[NOISE_FORCE] = tool * _at(spill[SPILL_FORCE], 0.0)
+    noise[NOISE_FORCE_CHIP] = tool * (_at(spill[FORCE_BAND], 0.0) - _at(spill[FORCE_BAND], -turn))
+    noise[NOISE_CHIP] = (tool + workpiece) * change
+    noise[NOISE_WORKPIECE] = workpiece * change
+    row = spill[INERTIA_BAND]
+    change = 2.0 * _at(row, 0.0) - _at(row, turn) - _at(row, -turn)
+    noise[NOISE_PULL_WORKPIECE] = -workpiece * change
+
+
+@compiled()
+def _fit(
+    cross: float, square: float, target: float, noise_cross: float, noise_square: float,
+    count: float, usual: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Slope, its standard error and what part of the square is no noise, by least squares.
+
+    Args:
+        cross: Sum of products.
+        square: Sum of squares of what is known.
+        target: Sum of squares of what is fitted.
+        noise_cross: What noise adds to `cross`.
+        noise_square: What noise adds to `square`.
+        count: Outputs.
+        usual: Mean square misfit in quiet cutting, nan where unknown.
+    """
+    clear = max(square - noise_square, _LEAST * square)
+    slope = (cross - noise_cross) / clear
+    misfit = max(target - 2.0 * slope * cross + slope * slope * square, 0.0)
+    if usual == usual:
+        misfit = (misfit + _USUAL * usual) / (count + _USUAL)
+    else:
+        misfit /= max(count - 4.0, 1.0)
+    misfit += _MODEL_ERROR * target / count / math.sqrt(count)
+    error = math.sqrt(_CORRELATION * misfit * square) / clear
+    return slope, error, clear / square
+
+
+@compiled()
 def identify(
-    products: Array, newest: int, lengths: Integers, mechanics: Array, figures: Array,
-    guess: complex, windows: Array,
+    products: Array, newest: int, lengths: Integers, mechanics: Array, noise: Array,
+    figures: Array, guess: complex, windows: Array,
 ) -> None:  # fmt: skip
     """What every window says.
 
@@ -142,12 +230,17 @@ def identify(
         newest: Where the newest stands.
         lengths: Of the windows, hops, rising (windows,).
         mechanics: From `mechanics_of`.
-        figures: Delay, s; independent real numbers in an output; smallest mean square of the
-            errors of force and pull, N2 (4,).
-        guess: The rightmost root for a similar cut, 1/s.
+        noise: From `noise_sums`.
+        figures: Delay, s; mean square misfit of the force in quiet cutting, N2, or nan; and of
+            a similar cut C w and k, N/m (4,).
+        guess: The rightmost root for the similar cut, 1/s.
         windows: Written (windows, WINDOW_SIZE); nan where unknown.
     """
-    delay, independent = figures[0], figures[1]
+    delay, usual = figures[0], figures[1]
+    _, slope, by_cutting, by_stiffness = characteristic(
+        mechanics, figures[2], figures[3], delay, guess
+    )
+    usual_slopes = abs((by_cutting / slope).real), abs((by_stiffness / slope).real)
     total = np.zeros(PRODUCTS_SIZE)
     done = 0
     for number in range(lengths.size):
@@ -160,25 +253,39 @@ def identify(
         known[WINDOW_OUTPUTS] = count
         if count < 2.0:
             continue
-        known[WINDOW_RELATIVE_POWER] = total[RELATIVE_POWER] / count
         known[WINDOW_TOOL_POWER] = total[TOOL_POWER] / count
         if total[CHIP_CHIP] <= 0.0 or total[WORKPIECE_WORKPIECE] <= 0.0:
             continue
-        cutting = total[FORCE_CHIP] / total[CHIP_CHIP]
-        stiffness = total[PULL_WORKPIECE] / total[WORKPIECE_WORKPIECE]
-        misfit = (total[FORCE_FORCE] - cutting * total[FORCE_CHIP]) / count
-        cutting_variance = max(misfit, figures[2]) / (independent * total[CHIP_CHIP])
-        misfit = (total[PULL_PULL] - stiffness * total[PULL_WORKPIECE]) / count
-        stiffness_variance = max(misfit, figures[3]) / (independent * total[WORKPIECE_WORKPIECE])
-        known[CUTTING], known[CUTTING_ERROR] = cutting, math.sqrt(cutting_variance)
-        known[STIFFNESS], known[STIFFNESS_ERROR] = stiffness, math.sqrt(stiffness_variance)
-        cutting = max(cutting, 0.0)
+        known[CUTTING], known[CUTTING_ERROR], known[CLEARNESS] = _fit(
+            total[FORCE_CHIP], total[CHIP_CHIP], total[FORCE_FORCE],
+            count * noise[NOISE_FORCE_CHIP], count * noise[NOISE_CHIP], count, usual,
+        )  # fmt: skip
+        known[STIFFNESS], known[STIFFNESS_ERROR], _ = _fit(
+            total[PULL_WORKPIECE], total[WORKPIECE_WORKPIECE], total[PULL_PULL],
+            count * noise[NOISE_PULL_WORKPIECE], count * noise[NOISE_WORKPIECE], count, np.nan,
+        )  # fmt: skip
+    # The stiffness seldom changes: the longest window that agrees with a short one knows it best.
+    short, short_error = windows[_REFERENCE, STIFFNESS], windows[_REFERENCE, STIFFNESS_ERROR]
+    for number in range(lengths.size):
+        known = windows[number]
+        if known[CUTTING] != known[CUTTING]:
+            continue
+        stiffness, error = known[STIFFNESS], known[STIFFNESS_ERROR]
+        for longer in range(lengths.size - 1, number, -1):
+            other = windows[longer]
+            if abs(other[STIFFNESS] - short) < _AGREEMENT * (other[STIFFNESS_ERROR] + short_error):
+                stiffness, error = other[STIFFNESS], other[STIFFNESS_ERROR]
+                break
+        cutting = max(known[CUTTING], 0.0)
         stiffness = min(max(stiffness, mechanics[SOFTEST]), mechanics[STIFFEST])
         s = root_near(mechanics, cutting, stiffness, delay, guess)
         _, slope, by_cutting, by_stiffness = characteristic(
             mechanics, cutting, stiffness, delay, s
         )
-        variance = cutting_variance * (by_cutting / slope).real ** 2
-        variance += stiffness_variance * (by_stiffness / slope).real ** 2
+        # Far off the curve is flat, and would make a wild value look sure.
+        of_cutting = max(abs((by_cutting / slope).real), usual_slopes[0])
+        of_stiffness = max(abs((by_stiffness / slope).real), usual_slopes[1])
+        variance = (known[CUTTING_ERROR] * of_cutting) ** 2 + (error * of_stiffness) ** 2
+        known[STIFFNESS], known[STIFFNESS_ERROR] = stiffness, error
         known[GROWTH], known[GROWTH_ERROR] = s.real, math.sqrt(variance)
         known[ANGULAR_FREQUENCY] = s.imag

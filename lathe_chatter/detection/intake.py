@@ -8,11 +8,18 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lathe_chatter.compiled import compiled
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import Array
 
-SIGNALS = ('time', 'spindle_angle', 'tool_displacement', 'workpiece_displacement')
+_TIME, _ANGLE, _TOOL, _WORKPIECE = (
+    'time',
+    'spindle_angle',
+    'tool_displacement',
+    'workpiece_displacement',
+)
 _TO_MEASURE = 33
 """Samples at the start of a stretch from which its sample rate is taken."""
 
@@ -26,96 +33,151 @@ class Break(str, Enum):
 
 
 class Rate(NamedTuple):
-    """The sample rate of the stretch that begins here, Hz."""
-
-    value: float
-
-
-class Hop(NamedTuple):
-    """Consecutive samples.
+    """What a stretch that begins here has.
 
     Attributes:
-        time: Of the last, s.
-        block: Spindle angle, tool and workpiece displacement (samples, 3), rev and m.
+        value: Sample rate, Hz.
+        angle: Whether the spindle angle is seen.
+        workpiece: Whether both displacements are; with one it stands where the tool's would.
     """
 
-    time: float
+    value: float
+    angle: bool
+    workpiece: bool
+
+
+class Hops(NamedTuple):
+    """Consecutive samples, a whole number of hops.
+
+    Attributes:
+        times: Of the samples (n,), s.
+        block: Spindle angle, tool and workpiece displacement (n, 3), rev and m; 0 where there
+            is none.
+    """
+
+    times: Array
     block: Array
 
 
 class Intake:
     """Finds the signals by their labels and follows their times.
 
-    A sample that is no number counts as lost. Nothing depends on how the samples were cut
-    into batches.
+    A sample that is no number counts as lost; a sensor that is dead or missing from the start
+    of a stretch is done without. Nothing depends on how the samples were cut into batches.
     """
 
     def __init__(self) -> None:
         """Begin with nothing held."""
         self.hop = 1
-        self._rows: Array = np.empty((0, len(SIGNALS)))
+        self._held: list[Array] = []
+        self._count = 0
         self._step = math.nan
         self._last = math.nan
+        self._dead: NDArray[np.bool_] = np.zeros(4, bool)
+        self._names: tuple[str, ...] = ()
+        self._places = np.zeros(4, np.int64)
 
-    def take(self, samples: Array, columns: Sequence[str]) -> Iterator[Break | Rate | Hop]:
+    def take(self, samples: Array, columns: Sequence[str]) -> Iterator[Break | Rate | Hops]:
         """What a batch of samples (n, k) brings.
 
         The receiver sets `hop`, the samples in a hop, on every `Rate`.
 
         Raises:
-            LayoutError: If a column is missing or the layout is not that of the labels.
+            LayoutError: If there is no time or no displacement, or the layout is not that of
+                the labels.
         """
-        self._rows = np.vstack((self._rows, _signals(samples, columns)))
-        while len(self._rows):
+        self._held.append(self._signals(samples, columns))
+        self._count += len(samples)
+        known = not math.isnan(self._step)
+        if self._count < (self.hop if known else _TO_MEASURE):
+            return
+        rows = np.concatenate(self._held) if len(self._held) > 1 else self._held[0]
+        while len(rows):
             if math.isnan(self._step):
-                if len(self._rows) < _TO_MEASURE:
-                    return
-                self._step = float(np.median(np.diff(self._rows[:_TO_MEASURE, 0])))
-                if self._unbroken(self._rows[:_TO_MEASURE]) == _TO_MEASURE:
-                    yield Rate(1.0 / self._step)
-            whole = self._unbroken(self._rows)
-            broken = whole < len(self._rows)
-            whole -= whole % self.hop
-            for start in range(0, whole, self.hop):
-                hop = self._rows[start : start + self.hop]
-                self._last = float(hop[-1, 0])
-                yield Hop(self._last, np.ascontiguousarray(hop[:, 1:]))
-            self._rows = self._rows[whole:]
+                if len(rows) < _TO_MEASURE:
+                    break
+                yield from self._measure(rows)
+            whole = _unbroken(rows, self._last, self._step, self._dead)
+            broken = whole < len(rows)
+            taken = whole - whole % self.hop
+            if taken:
+                self._last = float(rows[taken - 1, 0])
+                block = np.where(self._dead[1:], 0.0, rows[:taken, 1:])
+                yield Hops(rows[:taken, 0], block)
+            rows = rows[taken:]
             if not broken:
-                return
-            yield self._leave_behind()
+                break
+            restarted, rows = self._leave_behind(rows, whole - taken)
+            yield Break.RESTART if restarted else Break.GAP
+        self._held, self._count = [rows], len(rows)
 
-    def _unbroken(self, rows: Array) -> int:
-        """How many rows continue the stretch."""
-        before = self._last if math.isfinite(self._last) else rows[0, 0] - self._step
-        steps = np.diff(rows[:, 0], prepend=before)
-        with np.errstate(invalid='ignore'):
-            good = np.abs(steps - self._step) < 0.5 * self._step
-        good &= np.isfinite(rows).all(axis=1)
-        return len(rows) if good.all() else int(np.argmin(good))
+    def _measure(self, rows: Array) -> Iterator[Rate]:
+        """Sample rate and channels of a stretch."""
+        first = rows[:_TO_MEASURE]
+        steps = np.diff(first[:, 0])
+        self._step = float(np.median(steps[np.isfinite(steps)])) if len(steps) else math.nan
+        self._dead = np.asarray(~np.isfinite(first).any(axis=0))
+        if self._dead[2] and not self._dead[3]:
+            # The workpiece's sensor alone stands for the tool's.
+            self._places[2], self._places[3] = self._places[3], -1
+            rows[:, 2], rows[:, 3] = rows[:, 3], math.nan
+            self._dead[2:] = False, True
+        usable = self._step > 0.0 and not self._dead[2]
+        if not usable:
+            self._step = self._step if self._step > 0.0 else 1.0
+            self._dead[2] = False
+            return
+        if _unbroken(first, self._last, self._step, self._dead) == _TO_MEASURE:
+            yield Rate(1.0 / self._step, not self._dead[1], not self._dead[3])
 
-    def _leave_behind(self) -> Break:
+    def _leave_behind(self, rows: Array, at: int) -> tuple[bool, Array]:
         """Drop what is held up to the break; a stretch begins with the next sample."""
-        at = self._unbroken(self._rows)
-        times = self._rows[: at + 1, 0]
+        times = rows[: at + 1, 0]
         before = times[at - 1] if at else self._last
         restarted = bool(times[at] <= before)
-        finite = bool(np.isfinite(self._rows[at]).all())
+        alive = rows[at][~self._dead]
+        finite = bool(np.isfinite(alive).all())
         # Where the very first sample of a stretch is the odd one, it must go or nothing moves.
-        self._rows = self._rows[at + (not finite or (at == 0 and math.isnan(self._last))) :]
+        drop = at + (not finite or (at == 0 and math.isnan(self._last)))
         self._step = self._last = math.nan
-        return Break.RESTART if restarted else Break.GAP
+        self._names = ()
+        return restarted, rows[drop:]
+
+    def _signals(self, samples: Array, columns: Sequence[str]) -> Array:
+        """Time, angle, tool and workpiece (n, 4), nan where there is no such column."""
+        names = tuple(columns)
+        if names != self._names:
+            self._names = names
+            wanted = (_TIME, _ANGLE, _TOOL, _WORKPIECE)
+            places = [names.index(name) if name in names else -1 for name in wanted]
+            if places[0] < 0 or max(places[2:]) < 0:
+                lacking = _TIME if places[0] < 0 else f'{_TOOL} and no {_WORKPIECE}'
+                self._names = ()
+                raise LayoutError(
+                    f'The samples have no column {lacking}, only {", ".join(names)}.'
+                )
+            if places[2] < 0:
+                places[2], places[3] = places[3], -1
+            self._places = np.array(places)
+        if samples.ndim != 2 or samples.shape[1] != len(names):
+            raise LayoutError(
+                f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
+            )
+        found: Array = samples[:, self._places]
+        found[:, self._places < 0] = math.nan
+        return found
 
 
-def _signals(samples: Array, columns: Sequence[str]) -> Array:
-    """The columns of `SIGNALS` (n, 4)."""
-    names = list(columns)
-    missing = [name for name in SIGNALS if name not in names]
-    if missing:
-        raise LayoutError(f'The samples have no column {missing[0]}, only {", ".join(names)}.')
-    if samples.ndim != 2 or samples.shape[1] != len(names):
-        raise LayoutError(
-            f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
-        )
-    found: Array = samples[:, [names.index(name) for name in SIGNALS]]
-    return found
+@compiled()
+def _unbroken(rows: Array, last: float, step: float, dead: NDArray[np.bool_]) -> int:
+    """How many rows (n, 4) continue the stretch."""
+    before = last if last == last else rows[0, 0] - step
+    for i in range(rows.shape[0]):
+        now = rows[i, 0]
+        if not abs(now - before - step) < 0.5 * step:
+            return i
+        for column in range(1, 4):
+            if not dead[column] and not np.isfinite(rows[i, column]):
+                return i
+        before = now
+    return int(rows.shape[0])

@@ -1,16 +1,19 @@
-"""From raw samples to signals in which only regeneration is left.
+"""From raw samples to signals in which only regeneration is left, compiled.
 
 Means of a few samples thin the data out. From every signal its own value one spindle turn
 before is subtracted, which removes runout, unbalance and the mean at once, with no time
-constant: u = x - x(t - tau). The chip thickness left is that of r = x_t - x_wp,
+constant: u = x - x(t - tau). Of r = x_t - x_wp that is the change of the chip thickness,
 
-    h = r - r(t - tau),   its change over a turn   q = h - h(t - tau),   F_u = C w q,
+    h = r - r(t - tau),    F = C w h  in the band,
 
-whatever is periodic and whatever the mean chip is. What the kernels make of these is summed
-up as products, from which every estimate follows.
+and F follows from the tool's own equation. A bank of resonators listens to h for what grows.
+The spread of the values at one and the same spindle angle, turn after turn, tells vibration
+that is the spindle's own from vibration that is not.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,12 +22,13 @@ from lathe_chatter.detection.kernels import Complex, Kernels
 from lathe_chatter.model import Array, Integers
 
 # Rows of the history of thinned samples.
-ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, RELATIVE_CHANGE, CHIP_CHANGE, HISTORY_ROWS = range(7)
+ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, CHIP, HISTORY_ROWS = range(6)
 
 # What is counted: samples held, place one turn ago, from where the changes hold, ...
-FILLED, POINTER, CHANGES_FROM, CHIPS_FROM, SINCE_OUTPUT, COUNTS_SIZE = range(6)
+FILLED, POINTER, CHANGES_FROM, SINCE_OUTPUT, COUNTS_SIZE = range(5)
 
-# Sums over the outputs of one hop: force F, chip q, workpiece x, pull F - m x'' - c x' = k x.
+# Sums over the outputs of one hop: force F, chip h, the changes u of workpiece and tool over a
+# turn, pull F - m x'' - c x' = k x; third differences of the raw samples; relative motion.
 (
     FORCE_FORCE,
     FORCE_CHIP,
@@ -32,11 +36,49 @@ FILLED, POINTER, CHANGES_FROM, CHIPS_FROM, SINCE_OUTPUT, COUNTS_SIZE = range(6)
     PULL_PULL,
     PULL_WORKPIECE,
     WORKPIECE_WORKPIECE,
-    RELATIVE_POWER,
     TOOL_POWER,
     OUTPUTS,
+    TOOL_NOISE,
+    WORKPIECE_NOISE,
+    TOOL_MEAN,
     PRODUCTS_SIZE,
-) = range(10)
+) = range(12)
+
+PHASES = 8
+"""Spindle angles at which a value is taken once a turn."""
+_FORGETTING = 1.0 / 8.0
+# Rows of the once-per-turn statistics: running mean and variance, values seen.
+PHASE_MEAN, PHASE_VARIANCE, PHASE_SEEN, PHASE_ROWS = range(4)
+
+# How the samples are read.
+THINNING, STRIDE, HAS_ANGLE, HAS_WORKPIECE, HAS_MACHINE, READING_SIZE = range(6)
+
+
+class Memory(NamedTuple):
+    """What the signals remember, changed in place.
+
+    Attributes:
+        history: Thinned samples (HISTORY_ROWS, capacity).
+        counts: (COUNTS_SIZE,).
+        resonators: (bins,).
+        phases: Once-per-turn statistics (PHASE_ROWS, PHASES).
+    """
+
+    history: Array
+    counts: Integers
+    resonators: Complex
+    phases: Array
+
+
+def fresh_memory(turn: float, kernels: Kernels) -> Memory:
+    """Nothing remembered yet, with room for turns of up to `turn` thinned samples."""
+    keep = int(1.1 * turn) + kernels.band.size + 32
+    return Memory(
+        np.zeros((HISTORY_ROWS, 2 * keep)),
+        np.zeros(COUNTS_SIZE, np.int64),
+        np.zeros(kernels.poles.size, complex),
+        np.zeros((PHASE_ROWS, PHASES)),
+    )
 
 
 @compiled(inline=True)
@@ -61,14 +103,18 @@ def _make_room(history: Array, counts: Integers) -> None:
     shift = counts[FILLED] - keep
     history[:, :keep] = history[:, shift : shift + keep].copy()
     counts[FILLED] = keep
-    for place in (POINTER, CHANGES_FROM, CHIPS_FROM):
+    for place in (POINTER, CHANGES_FROM):
         counts[place] = max(counts[place] - shift, 0)
 
 
 @compiled()
-def _take_changes(history: Array, counts: Integers) -> None:
-    """Fill in the changes over a turn of the newest thinned sample."""
+def _take_changes(history: Array, counts: Integers, reading: Integers) -> bool:
+    """Fill in the changes over a turn of the newest thinned sample; whether there are any."""
     n = counts[FILLED] - 1
+    if reading[HAS_ANGLE] == 0:
+        history[TOOL_CHANGE, n] = history[TOOL, n]
+        history[CHIP, n] = history[TOOL, n] - history[WORKPIECE, n]
+        return True
     angles = history[ANGLE]
     before = angles[n] - 1.0
     p = counts[POINTER]
@@ -76,67 +122,91 @@ def _take_changes(history: Array, counts: Integers) -> None:
         p += 1
     counts[POINTER] = p
     if p < 2 or p > n - 4 or angles[p] > before:
-        counts[CHANGES_FROM] = counts[CHIPS_FROM] = n + 1
-        return
+        counts[CHANGES_FROM] = n + 1
+        return False
     x = (before - angles[p]) / (angles[p + 1] - angles[p])
     tool = history[TOOL, n] - _interpolated(history[TOOL], p, x)
-    relative = tool - history[WORKPIECE, n] + _interpolated(history[WORKPIECE], p, x)
-    history[TOOL_CHANGE, n] = tool
-    history[RELATIVE_CHANGE, n] = relative
-    if p - 2 < counts[CHANGES_FROM]:
-        counts[CHIPS_FROM] = n + 1
-        return
-    history[CHIP_CHANGE, n] = relative - _interpolated(history[RELATIVE_CHANGE], p, x)
+    history[TOOL_CHANGE, n] = history[CHIP, n] = tool
+    if reading[HAS_WORKPIECE] != 0:
+        history[CHIP, n] -= history[WORKPIECE, n] - _interpolated(history[WORKPIECE], p, x)
+    return True
 
 
 @compiled()
-def _take_products(history: Array, first: int, kernels: Kernels, products: Array) -> complex:
-    """Multiply the newest samples by the kernels and add up; the band-passed relative motion."""
-    force = chip = place = inertia = tool = 0j
+def _take_phase(history: Array, n: int, phases: Array) -> None:
+    """Note the relative motion where the spindle passes one of a few fixed angles."""
+    now, before = PHASES * history[ANGLE, n], PHASES * history[ANGLE, n - 1]
+    mark = np.floor(now)
+    if mark <= before:
+        return
+    x = (mark - before) / (now - before)
+    value = x * (history[TOOL, n] - history[WORKPIECE, n])
+    value += (1.0 - x) * (history[TOOL, n - 1] - history[WORKPIECE, n - 1])
+    place = int(mark) % PHASES
+    seen = phases[PHASE_SEEN, place]
+    share = max(_FORGETTING, 1.0 / (seen + 1.0))
+    off = value - phases[PHASE_MEAN, place]
+    phases[PHASE_MEAN, place] += share * off
+    phases[PHASE_VARIANCE, place] += share * (
+        (1.0 - share) * off**2 - phases[PHASE_VARIANCE, place]
+    )
+    phases[PHASE_SEEN, place] = seen + 1.0
+
+
+@compiled()
+def _take_products(
+    history: Array, first: int, kernels: Kernels, reading: Integers, products: Array
+) -> None:
+    """Multiply the newest samples by the kernels and add up."""
+    force = chip = tool = pull = place = 0j
     for i in range(kernels.band.size):
         change = history[TOOL_CHANGE, first + i]
-        moved = change - history[RELATIVE_CHANGE, first + i]
         tool += kernels.band[i] * change
-        force += kernels.force[i] * change
-        chip += kernels.band[i] * history[CHIP_CHANGE, first + i]
-        place += kernels.band[i] * moved
-        inertia += kernels.inertia[i] * moved
-    pull = force - inertia
-    relative = tool - place
+        if reading[HAS_MACHINE] != 0:
+            moved = change - history[CHIP, first + i]
+            force += kernels.force[i] * history[TOOL, first + i]
+            chip += kernels.band[i] * history[CHIP, first + i]
+            pull += kernels.force[i] * change - kernels.inertia[i] * moved
+            place += kernels.band[i] * moved
     products[FORCE_FORCE] += force.real**2 + force.imag**2
     products[FORCE_CHIP] += force.real * chip.real + force.imag * chip.imag
     products[CHIP_CHIP] += chip.real**2 + chip.imag**2
     products[PULL_PULL] += pull.real**2 + pull.imag**2
     products[PULL_WORKPIECE] += pull.real * place.real + pull.imag * place.imag
     products[WORKPIECE_WORKPIECE] += place.real**2 + place.imag**2
-    products[RELATIVE_POWER] += relative.real**2 + relative.imag**2
     products[TOOL_POWER] += tool.real**2 + tool.imag**2
     products[OUTPUTS] += 1.0
-    return relative
+
+
+@compiled()
+def _noise_of(block: Array, column: int) -> float:
+    """Variance of the noise of single samples, from their third differences."""
+    total = 0.0
+    for i in range(3, block.shape[0]):
+        third = block[i, column] - block[i - 3, column]
+        third -= 3.0 * (block[i - 1, column] - block[i - 2, column])
+        total += third**2
+    return float(total / (20.0 * (block.shape[0] - 3)))
 
 
 @compiled()
 def follow(
-    block: Array, strides: Integers, kernels: Kernels, memory: tuple[Array, Integers],
-    results: tuple[Array, Complex],
-) -> int:  # fmt: skip
+    block: Array, reading: Integers, kernels: Kernels, memory: Memory, products: Array
+) -> None:
     """Take in one hop of samples.
 
     Args:
         block: Spindle angle, tool and workpiece displacement (n, 3), rev and m.
-        strides: Samples a thinned sample, thinned samples an output.
+        reading: (READING_SIZE,).
         kernels: From `kernels.design`.
-        memory: History (HISTORY_ROWS, capacity) and counts (COUNTS_SIZE,), changed in place.
-        results: Written: products (PRODUCTS_SIZE,) and band-passed relative motion (outputs,).
-
-    Returns:
-        The number of outputs.
+        memory: Changed in place.
+        products: Written (PRODUCTS_SIZE,).
     """
-    history, counts = memory
-    products, motion = results
+    history, counts = memory.history, memory.counts
     products[:] = 0.0
-    made, taps = 0, kernels.band.size
-    thinning, stride = strides[0], strides[1]
+    products[TOOL_NOISE] = _noise_of(block, 1)
+    products[WORKPIECE_NOISE] = _noise_of(block, 2)
+    thinning, taps = reading[THINNING], kernels.band.size
     for start in range(0, block.shape[0], thinning):
         if counts[FILLED] == history.shape[1]:
             _make_room(history, counts)
@@ -147,20 +217,15 @@ def follow(
                 total += block[i, row]
             history[row, n] = total / thinning
         counts[FILLED] = n + 1
-        _take_changes(history, counts)
-        counts[SINCE_OUTPUT] += 1
-        if counts[SINCE_OUTPUT] < stride:
+        products[TOOL_MEAN] += history[TOOL, n] * thinning / block.shape[0]
+        if reading[HAS_ANGLE] != 0 and n > 0:
+            _take_phase(history, n, memory.phases)
+        if not _take_changes(history, counts, reading):
             continue
-        counts[SINCE_OUTPUT] = 0
+        for j in range(memory.resonators.size):
+            memory.resonators[j] = kernels.poles[j] * memory.resonators[j] + history[CHIP, n]
+        counts[SINCE_OUTPUT] += 1
         first = n + 1 - taps
-        if first >= counts[CHIPS_FROM]:
-            motion[made] = _take_products(history, first, kernels, products)
-            made += 1
-    return made
-
-
-def fresh_memory(turn: float, taps: int) -> tuple[Array, Integers]:
-    """Nothing remembered yet, with room for turns of up to `turn` thinned samples."""
-    keep = int(2.1 * turn) + taps + 32
-    counts = np.zeros(COUNTS_SIZE, np.int64)
-    return np.zeros((HISTORY_ROWS, 2 * keep)), counts
+        if counts[SINCE_OUTPUT] >= reading[STRIDE] and first >= counts[CHANGES_FROM]:
+            counts[SINCE_OUTPUT] = 0
+            _take_products(history, first, kernels, reading, products)

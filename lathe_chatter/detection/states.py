@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
+
+from lathe_chatter.detection.advice import Advice
+from lathe_chatter.model import Machine
 
 IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = (
     'idle',
@@ -16,6 +20,30 @@ IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = (
 STATES = (IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN)
 
 
+class Mode(str, Enum):
+    """With how much the detector has to work."""
+
+    FULL = 'both displacements and the machine are known'
+    ONE_SENSOR = 'one displacement only'
+    NO_MACHINE = 'the machine is not known'
+    NO_SPINDLE = 'the spindle is not seen'
+    WAITING = 'no samples yet'
+
+    @classmethod
+    def of(cls, machine: Machine | None, *, angle: bool, workpiece: bool) -> Mode:
+        """The mode for what is there; the gravest lack names it."""
+        if not angle:
+            return cls.NO_SPINDLE
+        if not workpiece:
+            return cls.ONE_SENSOR
+        return cls.FULL if machine is not None else cls.NO_MACHINE
+
+    @property
+    def sees_spindle(self) -> bool:
+        """Whether the spindle speed is known."""
+        return self not in {Mode.NO_SPINDLE, Mode.WAITING}
+
+
 @dataclass(frozen=True)
 class Estimate:
     """The detector's knowledge after a sample; nan or None where something is not known.
@@ -26,24 +54,52 @@ class Estimate:
             suspected), `chatter`, `forced` (vibration, but the spindle's own), or `unknown`
             (too little data, a ramp, a gap).
         chatter: The alarm; it stays until the chatter has died out.
+        mode: With how much the detector has to work.
         growth_rate: Real part of the rightmost root of the identified cut, 1/s.
         growth_rate_error: Its standard error, 1/s.
         frequency: Of the chatter, or of the least damped vibration, Hz.
         amplitude: Of the tool's vibration in the band that is not the spindle's own, m.
+        spindle_speed_rpm: rev/min.
         cutting_stiffness: C w, N/m.
         workpiece_stiffness: What carries the workpiece: k_wp, up to k_wp + k_bc, N/m.
         bearing_engaged: Whether the workpiece rests on its bearing, at least in part.
-        recommended_speed_rpm: A spindle speed at which the cut would be stable, rev/min.
+        once_per_turn: Variance at one spindle angle from turn to turn, over all variance: near
+            1 for chatter, near 0 for vibration that is the spindle's own.
+        score: Suspicion; 1 raises the alarm.
+        advice: What to do about the chatter.
     """
 
     time: float = math.nan
     state: str = UNKNOWN
     chatter: bool = False
+    mode: Mode = Mode.WAITING
     growth_rate: float = math.nan
     growth_rate_error: float = math.nan
     frequency: float = math.nan
     amplitude: float = math.nan
+    spindle_speed_rpm: float = math.nan
     cutting_stiffness: float = math.nan
     workpiece_stiffness: float = math.nan
     bearing_engaged: bool | None = None
-    recommended_speed_rpm: float = math.nan
+    once_per_turn: float = math.nan
+    score: float = math.nan
+    advice: Advice = field(default_factory=Advice)
+
+    @property
+    def doubling_time(self) -> float:
+        """Time in which the chatter doubles, s; infinite where it does not grow."""
+        if self.growth_rate <= 0.0:
+            return math.inf
+        return math.log(2.0) / self.growth_rate
+
+    @property
+    def waves_per_revolution(self) -> float:
+        """Vibrations in a spindle turn."""
+        if not self.spindle_speed_rpm > 0.0:
+            return math.nan
+        return 60.0 * self.frequency / self.spindle_speed_rpm
+
+    @property
+    def recommended_speed_rpm(self) -> float:
+        """A spindle speed at which the cut would be stable, rev/min."""
+        return self.advice.speeds[0].spindle_speed_rpm if self.advice.speeds else math.nan

@@ -1,0 +1,299 @@
+"""The detector in service: what may happen to a cut and its sensors, by name.
+
+Whether a cut is stable is told by its rightmost characteristic root.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.errors import LayoutError
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine
+from lathe_chatter.stability import critical_depth, rightmost_root
+
+_BATCH = 100
+_TOOL, _WORKPIECE = (
+    SAMPLE_COLUMNS.index(f'{part}_displacement') for part in ('tool', 'workpiece')
+)
+_FORCE_NOISE, _SENSOR_NOISE = 4.5e-4, 1e-7
+"""N/sqrt(Hz) and m, as in a workshop."""
+
+
+def _cut(depth: float = 0.3e-3, **fields: Any) -> Cut:
+    usual = {
+        'spindle_speed_rpm': 3000.0,
+        'bearing_contact': 'none',
+        'force_noise': _FORCE_NOISE,
+        'sensor_noise': _SENSOR_NOISE,
+    }
+    return Cut(depth_of_cut=depth, **{**usual, **fields})
+
+
+def _limit(rpm: float = 3000.0, *, seated: bool = False) -> float:
+    return critical_depth(Machine(), rpm, seated=seated)
+
+
+def _watch(
+    detector: ChatterDetector, samples: Array, columns: tuple[str, ...] = SAMPLE_COLUMNS
+) -> list[Estimate]:
+    return [
+        detector.update(samples[start : start + _BATCH], columns)
+        for start in range(0, len(samples), _BATCH)
+    ]
+
+
+def _seconds(lathe: VirtualLathe, duration: float) -> Array:
+    return lathe.advance(round(duration * lathe.sample_rate))
+
+
+def _play(
+    steps: list[tuple[float, dict[str, Any]]], start: Cut | None = None, **settings: Any
+) -> Array:
+    """Samples of a lathe that is changed after each of some times, s."""
+    lathe = VirtualLathe(cut=start or _cut(), **settings)
+    blocks = []
+    for duration, changes in steps:
+        blocks.append(_seconds(lathe, duration))
+        lathe.retune(lathe.cut.with_changes(**changes))
+    return np.concatenate([*blocks, _seconds(lathe, 2.0)])
+
+
+def _flagged(estimates: list[Estimate]) -> bool:
+    return any(estimate.chatter for estimate in estimates)
+
+
+_STABLE: dict[str, Callable[[], Array]] = {
+    'speed steps': lambda: _play([(2.0, {'spindle_speed_rpm': 3600.0}), (2.0, {})]),
+    'speed ramps': lambda: _play(
+        [(2.0, {'spindle_speed_rpm': 9000.0}), (3.0, {'spindle_speed_rpm': 3000.0}), (3.0, {})],
+        spindle_acceleration=3000.0,
+    ),
+    'speed variation': lambda: _play(
+        [(2.0, {'speed_variation_amplitude': 0.1, 'speed_variation_frequency': 1.0}), (2.0, {})]
+    ),
+    'depth steps': lambda: _play(
+        [(2.0, {'depth_of_cut': 0.9 * _limit()}), (2.0, {'depth_of_cut': 0.1e-3}), (1.0, {})]
+    ),
+    'clearance changes': lambda: _play(
+        [(2.0, {'bearing_clearance': 2e-6}), (2.0, {'bearing_clearance': 8e-6})],
+        _cut(0.2e-3, bearing_contact='gap'),
+    ),
+    'contact changes': lambda: _play(
+        [(2.0, {'bearing_contact': 'seated'}), (2.0, {'bearing_contact': 'none'})]
+    ),
+    'feed changes': lambda: _play([(2.0, {'feed_speed': 0.01}), (2.0, {'feed_speed': 0.001})]),
+    'tool out of cut and back': lambda: _play(
+        [(2.0, {'feed_speed': 0.0}), (0.5, {'depth_of_cut': 0.0}), (1.0, {'depth_of_cut': 3e-4})]
+    ),
+    'runout and unbalance': lambda: _play([(2.0, {'runout': 2e-5}), (2.0, {})]),
+    'sensor noise': lambda: _play([(2.0, {}), (2.0, {})], _cut(sensor_noise=2e-6)),
+    'no noise at all': lambda: _play([(2.0, {})], _cut(force_noise=0.0, sensor_noise=0.0)),
+}
+
+
+@pytest.mark.parametrize('story', _STABLE.values(), ids=_STABLE)
+def test_what_a_stable_cut_goes_through_is_no_chatter(story: Callable[[], Array]) -> None:
+    """Every cut on the way is stable by its root."""
+    seen = _watch(ChatterDetector(), story())
+    assert not _flagged(seen)
+    assert all(np.isfinite(estimate.time) for estimate in seen[1:])
+
+
+def test_a_knock_that_dies_out_is_no_chatter() -> None:
+    """The energy jumps as no growth explains."""
+    lathe, detector, seen = VirtualLathe(cut=_cut(0.5 * _limit())), ChatterDetector(), []
+    for impulse in (0.0, 1e-4, -1e-3, 1e-3):
+        lathe.knock(impulse)
+        seen += _watch(detector, _seconds(lathe, 2.0))
+    assert not _flagged(seen)
+
+
+def test_ramps_are_not_judged() -> None:
+    """While the speed changes the state is unknown; later it is stable."""
+    lathe = VirtualLathe(cut=_cut(), spindle_acceleration=3000.0)
+    detector = ChatterDetector()
+    assert _watch(detector, _seconds(lathe, 3.0))[-1].state == 'stable'
+    lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=6000.0))
+    assert _watch(detector, _seconds(lathe, 0.5))[-1].state == 'unknown'
+    assert _watch(detector, _seconds(lathe, 4.0))[-1].state == 'stable'
+
+
+def test_a_machine_at_rest_or_without_a_cut_is_idle() -> None:
+    """Nothing is cut: no state of a cut is said."""
+    seen = _watch(ChatterDetector(), _seconds(VirtualLathe(cut=_cut(0.0, force_noise=0.0)), 3.0))
+    assert seen[-1].state == 'idle'
+    still = np.zeros((20_000, 8))
+    still[:, 0] = np.arange(1, 20_001) / 1e4
+    still[:, 2:6] = 1e-7 * np.random.default_rng(0).standard_normal((20_000, 4))
+    assert _watch(ChatterDetector(), still)[-1].state == 'idle'
+
+
+def test_vibration_that_is_the_spindles_own_is_forced() -> None:
+    """A runout large enough to be told, of a stable cut: once per turn it repeats."""
+    seen = _watch(ChatterDetector(), _seconds(VirtualLathe(cut=_cut(runout=1e-4)), 4.0))
+    assert seen[-1].state == 'forced'
+    assert seen[-1].once_per_turn < 0.2
+    assert not _flagged(seen)
+
+
+def _chatter(duration: float = 3.0, **fields: Any) -> Array:
+    """A cut that chatters from the start."""
+    return _seconds(VirtualLathe(cut=_cut(1.5 * _limit(), **fields)), duration)
+
+
+def _quantised(samples: Array) -> Array:
+    samples[:, [_TOOL, _WORKPIECE]] = np.round(samples[:, [_TOOL, _WORKPIECE]] / 1e-6) * 1e-6
+    return samples
+
+
+def _clipped(samples: Array) -> Array:
+    for column in (_TOOL, _WORKPIECE):
+        middle = np.median(samples[:, column])
+        samples[:, column] = np.clip(samples[:, column], middle - 1e-5, middle + 1e-5)
+    return samples
+
+
+def _with_gaps(samples: Array) -> Array:
+    kept = np.ones(len(samples), bool)
+    for start in range(3000, len(samples), 5000):
+        kept[start : start + 200] = False
+    return samples[kept]
+
+
+_SENSORS: dict[str, Callable[[Array], Array]] = {
+    'quantised': _quantised,
+    'clipped': _clipped,
+    'lost batches': _with_gaps,
+    'as it is': lambda samples: samples,
+}
+
+
+@pytest.mark.parametrize('sensor', _SENSORS.values(), ids=_SENSORS)
+def test_chatter_is_seen_through_poor_sensors(sensor: Callable[[Array], Array]) -> None:
+    """And the same sensor raises no alarm in a stable cut."""
+    assert _flagged(_watch(ChatterDetector(), sensor(_chatter())))
+    stable = _seconds(VirtualLathe(cut=_cut()), 5.0)
+    assert not _flagged(_watch(ChatterDetector(), sensor(stable)))
+
+
+def test_saturated_chatter_from_the_first_sample_is_said() -> None:
+    """A monitor that is started late has never seen the cut stable."""
+    samples = _chatter(6.0)
+    detector = ChatterDetector()
+    seen = _watch(detector, samples[40_000:])
+    assert seen[-1].chatter
+    assert seen[-1].state == 'chatter'
+
+
+def test_the_alarm_is_latched_and_clears_once_the_chatter_has_died_out() -> None:
+    """It stays while the amplitude no longer grows, and goes when it is gone."""
+    lathe, detector = VirtualLathe(cut=_cut(1.5 * _limit())), ChatterDetector()
+    seen = _watch(detector, _seconds(lathe, 8.0))
+    first = next(place for place, estimate in enumerate(seen) if estimate.chatter)
+    assert all(estimate.chatter for estimate in seen[first:])
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=0.2e-3))
+    after = _watch(detector, _seconds(lathe, 4.0))
+    assert not after[-1].chatter
+    assert after[-1].state == 'stable'
+
+
+def test_time_that_jumps_back_begins_anew() -> None:
+    """After a reset of the lathe the same samples give the same decisions."""
+    samples = _chatter(2.0)
+    detector = ChatterDetector()
+    once = _watch(detector, samples)
+    assert once[-1].chatter
+    again = _watch(detector, samples)
+    assert not again[0].chatter
+    assert repr(again[-1]) == repr(once[-1])
+
+
+def test_a_sample_that_is_no_number_counts_as_lost() -> None:
+    """Neither an exception nor an alarm; later samples are judged as ever."""
+    samples = _seconds(VirtualLathe(cut=_cut()), 4.0)
+    samples[12_345, _TOOL] = np.nan
+    samples[23_456, _WORKPIECE] = np.inf
+    seen = _watch(ChatterDetector(), samples)
+    assert not _flagged(seen)
+    assert seen[-1].state == 'stable'
+
+
+def _without(*dropped: str) -> tuple[list[int], tuple[str, ...]]:
+    kept = [place for place, name in enumerate(SAMPLE_COLUMNS) if name not in dropped]
+    return kept, tuple(SAMPLE_COLUMNS[place] for place in kept)
+
+
+_LESS: dict[str, tuple[tuple[str, ...], bool]] = {
+    'FULL': ((), True),
+    'NO_MACHINE': ((), False),
+    'ONE_SENSOR': (('workpiece_displacement',), True),
+    'NO_SPINDLE': (('spindle_angle', 'workpiece_displacement'), False),
+}
+
+
+@pytest.mark.parametrize('mode', _LESS)
+def test_it_works_with_less_and_says_so(mode: str) -> None:
+    """One sensor, no machine, no spindle: chatter is flagged, a stable cut is not."""
+    dropped, knows = _LESS[mode]
+    kept, columns = _without(*dropped)
+    machine = Machine() if knows else None
+
+    def judged(depths: tuple[float, ...]) -> Iterator[list[Estimate]]:
+        lathe, detector = VirtualLathe(cut=_cut(depths[0])), ChatterDetector(machine)
+        for depth in depths:
+            lathe.retune(lathe.cut.with_changes(depth_of_cut=depth))
+            yield _watch(detector, _seconds(lathe, 4.0)[:, kept], columns)
+
+    stable, shaken = judged((0.5 * _limit(), 1.5 * _limit()))
+    assert not _flagged(stable)
+    assert shaken[-1].chatter
+    assert shaken[-1].mode.name == mode
+    root = rightmost_root(Machine(), 3000.0, 1.5 * _limit(), seated=False)
+    first = next(estimate for estimate in shaken if estimate.chatter)
+    assert first.frequency == pytest.approx(root.imag / (2.0 * np.pi), abs=8.0)
+
+
+def test_a_sensor_that_is_dead_is_done_without() -> None:
+    """nan from the start is as good as no column."""
+    samples = _chatter(3.0)
+    samples[:, _WORKPIECE] = np.nan
+    seen = _watch(ChatterDetector(), samples)
+    assert seen[-1].chatter
+    assert seen[-1].mode.name == 'ONE_SENSOR'
+
+
+@pytest.mark.parametrize('columns', [('time', 'spindle_angle'), ('tool_displacement',)])
+def test_samples_in_which_nothing_can_be_seen_are_refused(columns: tuple[str, ...]) -> None:
+    """One sentence that says what is lacking."""
+    with pytest.raises(LayoutError, match='have no column'):
+        ChatterDetector().update(np.zeros((10, len(columns))), columns)
+
+
+def test_what_is_identified_agrees_with_the_cut() -> None:
+    """C w, the workpiece's stiffness, growth and frequency, 0.3 s after the alarm."""
+    for seated in (False, True):
+        contact = 'seated' if seated else 'none'
+        depth = 1.2 * _limit(seated=seated)
+        lathe = VirtualLathe(cut=_cut(0.5 * depth, bearing_contact=contact))
+        detector = ChatterDetector()
+        _watch(detector, _seconds(lathe, 3.0))
+        lathe.retune(lathe.cut.with_changes(depth_of_cut=depth))
+        seen = _watch(detector, _seconds(lathe, 2.0))
+        first = next(place for place, estimate in enumerate(seen) if estimate.chatter)
+        known, machine = seen[first + 30], Machine()
+        root = rightmost_root(machine, 3000.0, depth, seated=seated)
+        assert abs(known.growth_rate - root.real) < max(1.0, 4.0 * known.growth_rate_error)
+        assert known.frequency == pytest.approx(root.imag / (2.0 * np.pi), abs=0.5)
+        assert known.cutting_stiffness == pytest.approx(machine.cutting_stiffness(depth), rel=0.05)
+        assert known.workpiece_stiffness == pytest.approx(
+            machine.workpiece_stiffness(seated=seated), rel=0.03
+        )
+        assert known.bearing_engaged is seated
+        assert known.waves_per_revolution == pytest.approx(known.frequency / 50.0)
+        assert known.doubling_time == pytest.approx(np.log(2.0) / known.growth_rate)
