@@ -85,7 +85,7 @@ LIMITS = np.array([np.inf, 6.5, 5.5, 5.0, 4.6, 4.3])
 """Growth rate over its standard error that is an alarm by itself, in each window."""
 _ENERGY_LIMIT = 3.85
 """Logarithm of the energy ratio, and half of growth over its error, that make an alarm."""
-_ENERGY_ALONE = 3.0
+_ENERGY_ALONE = 3.5
 """The same of the energy ratio alone, without a model of the machine."""
 _GROWTH_SHARE = 0.5
 _MOST_GROWTH = 6.0
@@ -93,6 +93,8 @@ _SMALLEST_GROWTH = 0.2
 """Growth rate below which nothing is called chatter, 1/s."""
 _TRUSTED = 3
 """The window by which it is judged whether the signal stands out of the sensors' noise."""
+_STRICTER = 1.5
+"""By how much surer growth must be without a model."""
 _PATIENT = 4
 """The shortest window whose growth is believed without a model."""
 _RAISED = 0.7
@@ -133,7 +135,8 @@ def _score(ledger: Ledger, windows: Array, model: bool) -> float:
             if not trust >= 0.5:
                 break
             if known[GROWTH] > _SMALLEST_GROWTH:
-                score = max(score, known[GROWTH] / known[GROWTH_ERROR] / LIMITS[number])
+                limit = LIMITS[number] if model else _STRICTER * LIMITS[number]
+                score = max(score, known[GROWTH] / known[GROWTH_ERROR] / limit)
     return score
 
 
@@ -288,7 +291,8 @@ def judge(
     amplitude = 2.0 * math.sqrt(max(windows[1, WINDOW_TOOL_POWER], 0.0)) / comb / figures[4]
     if model:
         follow_misfit(ledger, products[newest], windows[_TRUSTED, CLEARNESS] > 0.5)
-    numbers[SCORE] = _score(ledger, windows, model) if flags[RAMPING] == 0 else 0.0
+    known = flags[RAMPING] == 0 and flags[SEEN] > SETTLING
+    numbers[SCORE] = _score(ledger, windows, model) if known else 0.0
     stiff = figures[2] if model else 0.0
     if flags[ALARMED] == 0 and flags[RAMPING] == 0 and speed > 0.0:
         steady = _saturated(ledger, products, newest, strongest, stiff)

@@ -17,11 +17,13 @@ from lathe_chatter.continuity import Continuity, Joint
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.errors import LatheChatterError, LayoutError
 from lathe_chatter.lathe_parameters import machine_from
-from lathe_chatter.model import Array
+from lathe_chatter.model import Array, Machine
+from lathe_chatter.nodes.asked_machine import AskedMachine
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.messages import BlockReader
+from lathe_chatter.nodes.monitor_words import clearance, details, onset
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameters import MONITOR
+from lathe_chatter.nodes.parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.running import run_node
 from lathe_chatter.warm_up import warm_up
 
@@ -57,11 +59,19 @@ class MonitorNode(ParameterNode):
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
         warm_up()  # compiled before the first sample comes
+        source = ModelSource(self.values['model'])
+        self.machine: Machine | None = None
+        if source is ModelSource.PARAMETERS:
+            self.machine = machine_from(self.values)
+        self._asked: AskedMachine | None = None
+        if source is ModelSource.LATHE:
+            self._asked = AskedMachine(self, self._learn)
         self._detector = self._new_detector()
         self._continuity = Continuity()
         self._complaint = ''
         self._state, self._flag = _UNKNOWN, False
         self._figures: Mapping[str, float] = {}
+        self._details: Mapping[str, object] = {}
         self._next_report = -math.inf
         self._counted = _Counted(0, 0)
 
@@ -147,15 +157,28 @@ class MonitorNode(ParameterNode):
             self.get_logger().info(f'Listening from {times[0]:.6f} s on.')
         elif joint is Joint.RESTART:
             self.get_logger().info(f'At {before:.6f} s: the lathe started again; so do I.')
-            self._detector = self._new_detector()
-            self._next_report = -math.inf
+            self._begin_again()
+            if self._asked is not None:
+                self._asked.ask()  # it may be another machine
         elif joint is Joint.GAP:
             self.get_logger().warning(
                 f'At {before:.6f} s: the samples up to {times[0]:.6f} s did not come.'
             )
 
+    def _learn(self, machine: Machine) -> None:
+        """Take the machine that the lathe says it is."""
+        if machine != self.machine:
+            self.machine = machine
+            self.get_logger().info('The lathe has told what machine it is.')
+            self._begin_again()
+
+    def _begin_again(self) -> None:
+        self._detector = self._new_detector()
+        self._next_report = -math.inf
+
     def _new_detector(self) -> ChatterDetector:
-        return ChatterDetector(machine_from(self.values))
+        speeds = float(self.values['slowest_speed']), float(self.values['fastest_speed'])  # type: ignore[arg-type]  # numbers
+        return ChatterDetector(self.machine, speed_range=speeds)
 
     # -- telling ---------------------------------------------------------------------------
 
@@ -173,15 +196,16 @@ class MonitorNode(ParameterNode):
             self._flag_publisher.publish(Bool(data=self._flag))
             # Two calls: rclpy allows each place in the code one severity.
             if self._flag:
-                self.get_logger().warning(_onset(estimate))
+                self.get_logger().warning(onset(estimate))
             else:
-                self.get_logger().info(_clearance(estimate))
+                self.get_logger().info(clearance(estimate))
         if changed:
             self._diagnostics.publish_changes(self._statuses())
 
     def _publish_figures(self, estimate: Estimate) -> None:
         figures = {name: float(getattr(estimate, name)) for name in _FIGURES}
         self._figures = {name: value for name, value in figures.items() if math.isfinite(value)}
+        self._details = details(estimate)
         for name, value in self._figures.items():
             self._figure_publishers[name].publish(Float64(data=value))
 
@@ -193,6 +217,8 @@ class MonitorNode(ParameterNode):
 
     def _report(self) -> None:
         """Once a second; a second without samples means that nothing is known any more."""
+        if self._asked is not None and not self._asked.answered:
+            self._asked.ask()
         silent = self._continuity.samples == self._counted.samples
         if silent and self._state != _UNKNOWN:
             self._state = _UNKNOWN
@@ -201,7 +227,7 @@ class MonitorNode(ParameterNode):
         self._counted = _Counted(self._continuity.samples, self._continuity.lost)
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
-        cut = {'state': self._state, 'flag': self._flag, **self._figures}
+        cut = {'state': self._state, 'flag': self._flag, **self._figures, **self._details}
         return [
             self._samples_status(silent=silent),
             Status('cut', _LEVELS.get(self._state, OK), self._state, cut),
@@ -250,22 +276,6 @@ def _even(times: Array) -> bool:
     """Whether times (n,) follow each other without a gap or a jump back."""
     steps = np.diff(times)
     return steps.size == 0 or bool(0.0 < steps.max() < 1.5 * steps.min())
-
-
-def _onset(estimate: Estimate) -> str:
-    """What a machinist has to know, as far as it is known."""
-    known = [
-        (estimate.frequency, f'at {estimate.frequency:.1f} Hz'),
-        (estimate.growth_rate, f'growing at {estimate.growth_rate:.1f} 1/s'),
-        (estimate.amplitude, f'amplitude {estimate.amplitude * 1e6:.3g} um'),
-        (estimate.recommended_speed_rpm, f'try {estimate.recommended_speed_rpm:.0f} rev/min'),
-    ]
-    words = ', '.join(text for value, text in known if math.isfinite(value))
-    return f'At {estimate.time:.6f} s: chatter {words}.'
-
-
-def _clearance(estimate: Estimate) -> str:
-    return f'At {estimate.time:.6f} s: the chatter has died out; the cut is {estimate.state}.'
 
 
 def main() -> None:

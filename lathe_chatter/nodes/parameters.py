@@ -8,6 +8,7 @@ the sentence of a refusal and the tables of the README come from these rows.
 from __future__ import annotations
 
 import math
+from enum import Enum
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe_parameters import machine_from
@@ -26,6 +27,15 @@ def _derived_lathe(given: Values) -> Values:
     """The machine's derived values, once the two rates are known to agree."""
     rates = {name: float(given.get(name, LATHE[name].default)) for name in _RATES}  # type: ignore[arg-type]  # checked numbers
     samples_per_tick(rates['sample_rate'], rates['tick_rate'])
+    return _derived_machine(given)
+
+
+def _derived_monitor(given: Values) -> Values:
+    """The machine's derived values, once the range of speeds is one."""
+    slowest, fastest = (float(given.get(n, MONITOR[n].default)) for n in _SPEED_RANGE)  # type: ignore[arg-type]  # checked numbers
+    if slowest >= fastest:
+        allowed = f'above slowest_speed, which is {slowest:g} rev/min'
+        raise ParameterError('fastest_speed', fastest, 'rev/min', allowed)
     return _derived_machine(given)
 
 
@@ -54,6 +64,8 @@ def _setup_row(name: str) -> Row:
 
 
 _RATES = ('sample_rate', 'tick_rate')
+_SPEED_RANGE = ('slowest_speed', 'fastest_speed')
+_ADVISED = limits_of(Cut, 'spindle_speed_rpm')
 
 MACHINE_ROWS = tuple(rows_of(Machine()))
 CUT_ROWS = tuple(rows_of(Cut(), run_time=True))
@@ -97,7 +109,29 @@ LATHE = ParameterTable(
 )
 """Node `lathe`."""
 
-MONITOR = ParameterTable(MACHINE_ROWS, _derived_machine)
+
+class ModelSource(str, Enum):
+    """Where the monitor gets the machine from: its own parameters, the lathe's, or nowhere."""
+
+    PARAMETERS = 'parameters'
+    LATHE = 'lathe'
+    NONE = 'none'
+
+
+MONITOR = ParameterTable(
+    (
+        Row(
+            'model',
+            ModelSource.PARAMETERS.value,
+            (ModelSource.__doc__ or '').rstrip('.'),
+            choices=ModelSource,
+        ),
+        *MACHINE_ROWS,
+        Row('slowest_speed', 60.0, 'slowest spindle speed to recommend', _ADVISED),
+        Row('fastest_speed', 30000.0, 'fastest spindle speed to recommend', _ADVISED),
+    ),
+    _derived_monitor,
+)
 """Node `chatter_monitor`: the machine as an impact test would tell it, never the cut."""
 
 RECORDED_TOPICS = [

@@ -12,8 +12,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Array, BearingContact, Cut
+from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.monitor_node import MonitorNode
 
@@ -188,3 +190,51 @@ def messages_of_level(
     messages: list[DiagnosticArray], level: bytes = DiagnosticStatus.ERROR
 ) -> list[str]:
     return [s.message for m in messages for s in m.status if s.level == level]
+
+
+def test_the_machine_is_asked_from_the_lathe(start: Callable[..., Any], bench: Bench) -> None:
+    """With model:=lathe the monitor knows the machine once the lathe has told it."""
+    other = 0.5 * VirtualLathe().machine.workpiece.mass
+    start(LatheNode, **{'workpiece.mass': other})
+    monitor = start(MonitorNode, model='lathe')
+    bench.spin_until(lambda: monitor.machine is not None, 'the answer of the lathe')
+    assert monitor.machine.workpiece.mass == other
+
+
+def test_without_a_model_chatter_is_flagged_all_the_same(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    """With model:=none the state says so in the diagnostics."""
+    start(MonitorNode, model='none')
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    reports = bench.listen(DiagnosticArray, '/diagnostics')
+    lathe = Machine(bench, STABLE)
+    lathe.cut(3.0)
+    lathe.lathe.retune(UNSTABLE)
+    lathe.cut(3.0)
+    bench.spin_until(lambda: [flag.data for flag in flags] == [False, True], 'the flag')
+    said = 'the machine is not known'
+    bench.spin_until(
+        lambda: any(
+            value.value == said
+            for report in reports
+            for status in report.status
+            for value in status.values
+        ),
+        'the mode',
+    )
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ({'model': 'guess'}, 'one of parameters, lathe, none'),
+        ({'slowest_speed': 5e3, 'fastest_speed': 4e3}, 'slowest'),
+    ],
+)
+def test_a_wrong_parameter_is_refused_with_a_sentence(
+    start: Callable[..., Any], override: dict[str, Any], words: str
+) -> None:
+    """What is allowed is named."""
+    with pytest.raises(ParameterError, match=words):
+        start(MonitorNode, **override)

@@ -1,0 +1,125 @@
+"""What is no onset: events that only look like chatter, a late start, advice, and the CPU."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scenarios
+from advice import advice_figures
+from delays import quantiles, threshold_for
+from onsets import ASKED, CALIBRATION
+from recording import DETECTOR, Traces, run
+from rivals import HOP, RIVALS
+from scenarios import MACHINE, NOISES, STATES, Case
+from simulator import COLUMNS, RATE, Stretch, Surroundings, simulate
+
+from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.stability import rightmost_root
+
+
+def check(_options: Any) -> list[str]:
+    """The simulator against the roots."""
+    worst = 0.0
+    quiet = Surroundings(0.0, 0.0, 0.0, 0.0, (), ())
+    for rpm, seated in STATES:
+        for depth in (0.4e-3, 0.8e-3):
+            plan = (Stretch(3.5, rpm, depth, seated, knock=1e-4),)
+            samples = simulate(plan, quiet, 0)[5000:33000:10]
+            relative = samples[:, 2] - samples[:, 3]
+            lags = np.column_stack((relative[1:-1], relative[:-2]))
+            a, b = np.linalg.lstsq(lags, relative[2:], rcond=None)[0]
+            root = np.log(np.roots([1.0, -a, -b])[0]) * RATE / 10.0
+            worst = max(
+                worst, abs(root.real - rightmost_root(MACHINE, rpm, depth, seated=seated).real)
+            )
+    return [f'simulator: largest error of the growth rate {worst:.3f} 1/s']
+
+
+def benign(options: Any) -> list[str]:
+    """What only looks like chatter: share of events with an alarm within 2 s."""
+    number = 8 if options.quick else 200
+    lines = ['events without chatter that raise an alarm (rivals at their S1 threshold)']
+    calm = run(
+        [scenarios.stable('S1', CALIBRATION + k) for k in range(4 if options.quick else 60)],
+        'S1 stable',
+        options.processes,
+    )
+    limits = {name: threshold_for(calm, name, ASKED) for name in RIVALS} | {DETECTOR: 1.0}
+    kinds: dict[str, tuple[Callable[[int], Case], int]] = {
+        'stable-to-stable steps (S3)': (
+            lambda k: scenarios.steps('S3', k + 500),
+            number // 10 + 1,
+        ),
+        'ramps through a resonance': (scenarios.ramp, number),
+        'forced resonance': (scenarios.forced, number),
+        'knocks that die out': (scenarios.knocks, number // 5 + 1),
+        'contact changes, stable both ways': (scenarios.contact, number // 4 + 1),
+    }
+    for label, (make, repeats) in kinds.items():
+        found = run([make(k) for k in range(repeats)], label, options.processes)
+        events = sum(len(traces.case.events) for traces in found)
+        shares = []
+        for name, threshold in limits.items():
+            wrong = sum(_wrong(traces, name, threshold) for traces in found)
+            shares.append(f'{name} {100.0 * wrong / events:.1f} %')
+        lines.append(f'  {label:34s} {events} events: ' + ', '.join(reversed(shares)))
+        if label.startswith('forced'):
+            told = np.mean([traces.states[-1] == 'forced' for traces in found])
+            lines.append(f'  {"":34s} told as forced: {100.0 * told:.0f} %')
+    return lines
+
+
+def _wrong(traces: Traces, name: str, threshold: float) -> int:
+    """Events of a recording that are followed by an alarm before the next one."""
+    times = (np.flatnonzero(traces.scores[name] >= threshold) + 1) * HOP / RATE
+    marks = np.append(traces.case.events, np.inf)
+    hit, _ = np.histogram(times, [*marks[:-1].tolist(), 1e9])
+    return int((hit > 0).sum())
+
+
+def limit_cycle(case: Case) -> float:
+    """When a detector that is switched on in saturated chatter says so, s; and it stays."""
+    samples = simulate(case.plan, case.around, case.seed)[round(case.skipped * RATE) :]
+    detector, first = ChatterDetector(), np.inf
+    for start in range(0, len(samples) - HOP + 1, HOP):
+        estimate = detector.update(samples[start : start + HOP], COLUMNS)
+        if estimate.chatter and np.isinf(first):
+            first = estimate.time - samples[0, 0]
+    return first if estimate.chatter else np.inf
+
+
+def limit(options: Any) -> list[str]:
+    """The monitor started late."""
+    cases = [scenarios.saturated(k) for k in range(4 if options.quick else 40)]
+    with multiprocessing.Pool(options.processes) as pool:
+        found = np.array(pool.map(limit_cycle, cases, chunksize=2))
+    half, most = quantiles(found)
+    said = f'said after {1e3 * half:.0f} / {1e3 * most:.0f} ms, {int(np.isinf(found).sum())} not'
+    return [f'switched on in saturated chatter: {len(cases)} cases, {said}']
+
+
+def advice(options: Any) -> list[str]:
+    """Recommended speeds."""
+    return advice_figures(16 if options.quick else 200, options.processes)
+
+
+def cpu(options: Any) -> list[str]:
+    """What the detector takes, in batches of 0.1 s and as the node gets them."""
+    seconds = 3.0 if options.quick else 20.0
+    samples = simulate((Stretch(seconds + 1.0, 3000.0, 0.4e-3),), NOISES['S1'], 0)
+    lines = []
+    for size in (1000, HOP, 20):
+        detector = ChatterDetector()
+        detector.update(samples[:10000], COLUMNS)
+        begin = time.process_time()
+        for start in range(10000, len(samples), size):
+            detector.update(samples[start : start + size], COLUMNS)
+        spent = (time.process_time() - begin) / seconds
+        lines.append(
+            f'CPU in batches of {size:4d} samples: {1e3 * spent:.2f} ms a simulated second'
+        )
+    return lines

@@ -1,0 +1,150 @@
+"""S0 to S3: delay, misses and false alarms, beside the limit and the rivals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import scenarios
+from delays import (
+    confidence,
+    delays,
+    informed_cusum,
+    limit_formula,
+    quantiles,
+    rate,
+    rates_of,
+    threshold_for,
+    turns,
+)
+from recording import DETECTOR, Traces, run
+from rivals import HOP, RIVALS
+from scenarios import MACHINE
+from simulator import RATE
+
+from lathe_chatter.model import Array
+from lathe_chatter.stability import rightmost_root
+
+ASKED = 2.0
+"""False alarms an hour at which delays are compared."""
+CALIBRATION, REPORTED = 1_000_000, 0
+"""Where the seeds of the two sets begin."""
+
+
+def onsets(options: Any) -> list[str]:
+    """S0 to S3: delay, misses, false alarms, beside the limit and the rivals."""
+    lines, curves = [], {}
+    count, hours = (24, 0.1) if options.quick else (240, 10.5)
+    for noise in options.scenarios:
+        stepped = noise in {'S0', 'S3'}
+        make = scenarios.steps if stepped else scenarios.stable
+        watched = max(
+            4, round(hours * (600.0 if stepped else 3600.0) / (44.0 if stepped else 60.0))
+        )
+        calm = {
+            name: run(
+                [make(noise, seed + k) for k in range(n)], f'{noise} stable', options.processes
+            )
+            for name, seed, n in (
+                ('calibration', CALIBRATION, max(4, watched // 4)),
+                ('reported', REPORTED, watched),
+            )
+        }
+        shaken = run(
+            [scenarios.onset(noise, REPORTED + k) for k in range(count)],
+            f'{noise} onsets',
+            options.processes,
+        )
+        lines += [
+            f'{noise}: {count} onsets, {rate(calm["reported"], DETECTOR, 1.0)[1]:.2f} h stable'
+        ]
+        pace = turns(shaken)
+        asked = ASKED
+        if stepped:
+            asked = 0.01 * 3600.0 / scenarios.STEP
+            lines[-1] += f' in steps every {scenarios.STEP:g} s; asked: 1 % false alarms a step'
+        pairs = [rates_of(traces.case) for traces in shaken]
+        formula = np.array([limit_formula(*pair, asked / 3600.0) for pair in pairs])
+        lines.append(_line('  limit, mean delays by the formula', formula, pace, ''))
+        if not stepped:
+            rng = np.random.default_rng(0)
+            informed = np.array([informed_cusum(*pair, asked / 3600.0, rng) for pair in pairs])
+            lines.append(_line('  limit, single runs of that CUSUM', informed, pace, ''))
+        curves[noise] = {}
+        for name in (DETECTOR, *RIVALS):
+            threshold = (
+                1.0 if name == DETECTOR else threshold_for(calm['calibration'], name, asked)
+            )
+            number, watched_hours = rate(calm['reported'], name, threshold)
+            low, high = confidence(number, watched_hours)
+            false = f'{number} false = {number / watched_hours:.2f}/h ({low:.2f}-{high:.2f})'
+            if stepped:
+                events = sum(len(t.case.events) for t in calm['reported'])
+                false = f'{number} false in {events} steps = {100.0 * number / events:.2f} %'
+            lines.append(_line(f'  {name}', delays(shaken, name, threshold), pace, false))
+            curves[noise][name] = _curve(calm['reported'], shaken, name, pace)
+        lines.append('  ' + _estimates(shaken))
+    if options.plot:
+        _plot(curves, options.plot)
+        lines.append(f'delay against false-alarm rate: {options.plot}')
+    return lines
+
+
+def _line(name: str, delay: Array, pace: Array, false: str) -> str:
+    half, most = quantiles(delay * pace)
+    half_ms, most_ms = (1e3 * value for value in quantiles(delay))
+    missed = int(np.isinf(delay).sum())
+    return (
+        f'{name:36s} {half:6.1f} /{most:6.1f} rev  {half_ms:6.0f} /{most_ms:6.0f} ms  '
+        f'missed {missed}  {false}'
+    )
+
+
+def _estimates(onsets_: Sequence[Traces]) -> str:
+    """Errors 0.1 s after the alarm."""
+    errors = []
+    for traces, delay in zip(onsets_, delays(onsets_, DETECTOR, 1.0), strict=True):
+        if np.isinf(delay):
+            continue
+        place = round((traces.case.onset + delay + 0.1) * RATE / HOP) - 1
+        if place >= len(traces.growth):
+            continue
+        last = traces.case.plan[-1]
+        root = rightmost_root(MACHINE, last.rpm, last.depth, seated=last.seated)
+        errors.append(
+            (traces.frequency[place] - root.imag / (2.0 * np.pi), traces.growth[place] - root.real)
+        )
+    hertz, growth = np.nanmedian(np.abs(np.array(errors)), axis=0)
+    return f'100 ms after the alarm, median error: {hertz:.3f} Hz, growth {growth:.2f} 1/s'
+
+
+def _curve(stable: Sequence[Traces], shaken: Sequence[Traces], name: str, pace: Array) -> Array:
+    """False alarms an hour and median delay in turns, over thresholds (n, 2)."""
+    tried = np.quantile(
+        np.concatenate([t.scores[name] for t in stable]), 1.0 - np.geomspace(1e-7, 1e-2, 24)
+    )
+    points = []
+    for threshold in np.unique(tried):
+        number, hours = rate(stable, name, float(threshold))
+        points.append((number / hours, np.median(delays(shaken, name, float(threshold)) * pace)))
+    return np.array(points)
+
+
+def _plot(curves: dict[str, dict[str, Array]], file: str) -> None:
+    import matplotlib as mpl
+
+    mpl.use('Agg')
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, len(curves), figsize=(4.2 * len(curves), 3.8), squeeze=False)
+    for axis, (noise, of_names) in zip(axes[0], curves.items(), strict=True):
+        for name, points in of_names.items():
+            kept = points[np.isfinite(points[:, 1]) & (points[:, 0] > 0.0)]
+            axis.plot(kept[:, 0], kept[:, 1], 'o-', ms=3, label=name)
+        axis.axvline(ASKED, color='0.6', lw=1)
+        axis.set(xscale='log', yscale='log', title=noise, xlabel='false alarms per hour')
+    axes[0, 0].set_ylabel('median delay, revolutions')
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    figure.tight_layout()
+    figure.savefig(file, dpi=120)

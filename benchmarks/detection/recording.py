@@ -1,0 +1,77 @@
+"""Recordings, and what the detector and its rivals made of them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import time
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from rich.progress import Progress
+from rivals import HOP, RIVALS
+from scenarios import Case
+from simulator import COLUMNS, RATE, simulate
+
+from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.model import Array
+
+DETECTOR = 'this detector'
+
+
+class Traces(NamedTuple):
+    """What a recording gave.
+
+    Attributes:
+        case: What was recorded.
+        scores: Of each detector, one value a hop.
+        growth: The detector's growth rate, 1/s, a value a hop.
+        frequency: Its frequency, Hz.
+        states: Its states.
+        cpu: What the detector took, s.
+    """
+
+    case: Case
+    scores: dict[str, Array]
+    growth: Array
+    frequency: Array
+    states: list[str]
+    cpu: float
+
+
+def record(case: Case) -> Traces:
+    """Simulate and watch; the detector never alarms, so that every threshold can be tried."""
+    samples = simulate(case.plan, case.around, case.seed)
+    samples = samples[round(case.skipped * RATE) :]
+    detector = ChatterDetector(strictness=np.inf)
+    begin = time.process_time()
+    estimates = [
+        detector.update(samples[start : start + HOP], COLUMNS)
+        for start in range(0, len(samples) - HOP + 1, HOP)
+    ]
+    cpu = time.process_time() - begin
+    scores = {name: rival(samples) for name, rival in RIVALS.items()}
+    scores[DETECTOR] = np.nan_to_num(np.array([e.score for e in estimates]))
+    return Traces(
+        case,
+        scores,
+        np.array([e.growth_rate for e in estimates]),
+        np.array([e.frequency for e in estimates]),
+        [e.state for e in estimates],
+        cpu,
+    )
+
+
+def run(cases: Sequence[Case], label: str, processes: int) -> list[Traces]:
+    """Record all cases on all cores."""
+    with (
+        multiprocessing.Pool(processes) as pool,
+        Progress(transient=True, disable=not sys.stderr.isatty()) as progress,
+    ):
+        bar = progress.add_task(label, total=len(cases))
+        found = []
+        for traces in pool.imap_unordered(record, cases, chunksize=2):
+            found.append(traces)
+            progress.advance(bar)
+    return sorted(found, key=lambda traces: traces.case.seed)
