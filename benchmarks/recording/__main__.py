@@ -1,0 +1,60 @@
+"""The recording's figures on this machine, and what faults cost.
+
+    python benchmarks/recording [writing] [reading] [kills] [power] [disk] [flips] [truncation]
+                                [stalls] [--kills 50] [--cuts 10] [--flips 100] [--seconds 60]
+
+All parts by default, about four minutes; --seconds 600 has the recorder stand still 0.3 s in every
+second for ten minutes. Everything is written to and read from the folder for temporary files.
+`power` and `disk` mount small disks, which root can.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+from collections.abc import Callable, Sequence
+
+from damage import flips, truncation
+from endings import disk, kills, power, record_for_ever
+from speed import read_here, reading, writing
+from stalls import stalls
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser.add_argument('--kills', type=int, default=50, help='how many')
+    parser.add_argument('--cuts', type=int, default=10, help='of the power')
+    parser.add_argument('--flips', type=int, default=100, help='how many bits')
+    parser.add_argument('--seconds', type=float, default=60.0, help='of the stalls')
+    parser.add_argument('--record', help=argparse.SUPPRESS)
+    parser.add_argument('--read', nargs=2, help=argparse.SUPPRESS)
+    parser.add_argument('parts', nargs='*', metavar='part')
+    options = parser.parse_args(arguments)
+    if options.record:
+        record_for_ever(options.record)
+        return
+    if options.read:
+        read_here(*options.read)
+        return
+    parts: dict[str, Callable[[], None]] = {
+        'writing': writing,
+        'reading': reading,
+        'kills': lambda: kills(options.kills),
+        'power': lambda: power(options.cuts),
+        'disk': disk,
+        'flips': lambda: flips(options.flips),
+        'truncation': truncation,
+        'stalls': lambda: stalls(options.seconds),
+    }
+    unknown = set(options.parts) - set(parts)
+    if unknown:
+        parser.error(f'no such part: {", ".join(sorted(unknown))}; there are {", ".join(parts)}')
+    print(f'{os.cpu_count()} cores, {platform.release()}, Python {platform.python_version()}')
+    for name in options.parts or parts:
+        parts[name]()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,83 @@
+"""How fast a run is written and read, in the process that has the samples or wants them."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from runs import PER_COMMIT, START, TICK, blocks, samples_topic, scratch
+
+from lathe_chatter.model import SAMPLE_COLUMNS
+from lathe_chatter.recording import RunWriter, read_run
+
+
+def writing() -> None:
+    """Messages a second, and how long a commit holds the producer up, in a file of 300 s."""
+    with scratch() as place:
+        ready = [bytes(1000)] * 1000
+        began = time.perf_counter()
+        with RunWriter(place / 'fast') as writer:
+            writer.add_topic(samples_topic('/a'))
+            for k in range(300_000):
+                writer.write('/a', ready[k % 1000], log_time=START + k, publish_time=START)
+                if k % 25_000 == 0:
+                    writer.commit_soon()
+        rate = 300_000 / (time.perf_counter() - began)
+        print(f'writing: {rate / 1e3:.0f} thousand messages of 1 kB a second')
+        held: list[float] = []
+        with RunWriter(place / 'held') as writer:
+            writer.add_topic(samples_topic())
+            for k, data in enumerate(blocks(1200 * PER_COMMIT)):
+                began = time.perf_counter()
+                told = START + k * TICK
+                writer.write('/lathe/samples', data, log_time=told, publish_time=told)
+                if k % PER_COMMIT == PER_COMMIT - 1:
+                    writer.commit_soon()
+                held.append(time.perf_counter() - began)
+        times = 1e3 * np.array(held)
+        commits = times[PER_COMMIT - 1 :: PER_COMMIT]
+        print(
+            f'writing: a message holds its producer up {np.quantile(times, 0.999):.2f} ms at '
+            f'p99.9; a commit {np.median(commits):.2f} ms at p50, '
+            f'{np.quantile(commits, 0.999):.2f} ms at p99.9 over 1200 commits'
+        )
+
+
+def reading() -> None:
+    """Time and memory of reading 10 million samples, each in a process of its own."""
+    with scratch() as place:
+        with RunWriter(place / 'run', split_duration=300.0) as writer:
+            writer.add_topic(samples_topic())
+            for k, data in enumerate(blocks(500_000)):
+                told = START + k * TICK
+                writer.write('/lathe/samples', data, log_time=told, publish_time=told)
+                if k % PER_COMMIT == PER_COMMIT - 1:
+                    writer.commit_soon()
+        for columns in ('tool_displacement', ','.join(SAMPLE_COLUMNS)):
+            child = [
+                sys.executable,
+                str(Path(__file__).parent),
+                '--read',
+                str(place / 'run'),
+                columns,
+            ]
+            subprocess.run(child, check=True)  # noqa: S603 -- ourselves
+
+
+def read_here(run: str, columns: str) -> None:
+    """Read columns of a run, and say what it took."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began, busy = time.perf_counter(), time.process_time()
+    found = read_run(run).samples(columns=columns.split(','))
+    taken, busy = time.perf_counter() - began, time.process_time() - busy
+    memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e6
+    size = len(next(iter(found.columns.values())))
+    print(
+        f'reading: {size / 1e6:.0f} million samples, {len(found.columns)} columns, in '
+        f'{taken:.2f} s ({busy:.2f} s of processor time) with '
+        f'{memory:.2f} GB more than before, gaps {len(found.gaps)}'
+    )
