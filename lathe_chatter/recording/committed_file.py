@@ -17,7 +17,6 @@ from __future__ import annotations
 import contextlib
 import os
 import struct
-import zlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -37,6 +36,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.background_sync import BackgroundSync
+from lathe_chatter.recording.crc import crc32
 from lathe_chatter.recording.open_chunk import ClosedChunk, OpenChunk, record_bytes
 
 
@@ -155,7 +155,7 @@ class CommittedFile:
         self._sync.check()
         if self._tail and not self._body:
             return
-        crc = zlib.crc32(self._body, self._crc)
+        crc = crc32(self._body, self._crc)
         tail = self._summary(crc)
         try:
             _write_at(self._descriptor, b''.join((self._body, tail)), self._body_start)
@@ -223,7 +223,7 @@ class CommittedFile:
         start = self._end + len(data_end)
         # The CRC of a summary covers the footer up to the CRC itself.
         beginning = struct.pack('<BQQQ', Opcode.FOOTER, 20, start, 0)
-        summary_crc = zlib.crc32(beginning, zlib.crc32(summary))
+        summary_crc = crc32(beginning, crc32(summary))
         footer = Footer(summary_start=start, summary_offset_start=0, summary_crc=summary_crc)
         return b''.join((data_end, summary, record_bytes(footer), MCAP0_MAGIC))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +12,8 @@ import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex, McapRecord
+
+from lathe_chatter.recording.crc import crc32
 
 MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 """Opcode, length, channel, sequence, log time, publish time; the message follows."""
@@ -105,7 +106,7 @@ class OpenChunk:
                 data=compressed,
                 message_start_time=first,
                 message_end_time=last,
-                uncompressed_crc=zlib.crc32(self._records),
+                uncompressed_crc=crc32(self._records),
                 uncompressed_size=len(self._records),
             )
         )

@@ -175,8 +175,9 @@ class Run:
         """
         name = topic or self.samples_topic()
         wanted = None if columns is None else tuple(columns)
-        expected = sum(file.count(name) for file in self._opened())
-        found = joined(self._cuts(name, wanted), expected, start, end)
+        files = [*self._opened()]
+        expected = sum(file.count(name) for file in files)
+        found = joined(_cuts(files, name, wanted), expected, start, end)
         if found is None:
             raise RunReadError(f'{self.path} holds no samples of {name}.')
         if wanted is not None and set(wanted) - set(found.columns):
@@ -232,14 +233,6 @@ class Run:
             raise RunReadError(f'{self.path} holds several lathes, {", ".join(names)}: name one.')
         return names[0]
 
-    def _cuts(self, topic: str, wanted: tuple[str, ...] | None) -> Iterator[Cut]:
-        """Columns of the samples of a topic, by the quickest way that each file allows."""
-        for file in self._opened():
-            cuts = cuts_by_index(file, topic, wanted)
-            if cuts is None:
-                cuts = (cut_of(blocks, wanted) for blocks in _blocks(file, topic))
-            yield from cuts
-
     def _opened(self) -> Iterator[RecordedFile]:
         for path in self.files:
             yield RecordedFile(path, self._on_damage)
@@ -258,6 +251,17 @@ class Run:
                 if schema.name == kind:
                     return str(schema.data.decode())
         raise RunReadError(f'{self.path} does not say what a {kind} is.')
+
+
+def _cuts(
+    files: Iterable[RecordedFile], topic: str, wanted: tuple[str, ...] | None
+) -> Iterator[Cut]:
+    """Columns of the samples of a topic, by the quickest way that each file allows."""
+    for file in files:
+        cuts = cuts_by_index(file, topic, wanted)
+        if cuts is None:
+            cuts = (cut_of(blocks, wanted) for blocks in _blocks(file, topic))
+        yield from cuts
 
 
 def _blocks(file: RecordedFile, topic: str) -> Iterator[Blocks]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterable, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -15,7 +17,7 @@ from lathe_chatter.model import Array, Integers
 from lathe_chatter.recording.chunk_messages import HEAD, messages_of
 from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.recording.sample_blocks import Blocks, Layout, blocks_of
-from lathe_chatter.recording.scan import Damage, read_chunk
+from lathe_chatter.recording.scan import Damage, Read, read_chunk
 from lathe_chatter.recording.summary import ChunkPlace
 
 TIME = 'time'
@@ -76,6 +78,14 @@ class Room:
         """Begin with none."""
         self._signals: Array = np.empty((0, 0))
         self._records = np.empty(0, np.uint8)
+        self._read = bytearray()
+
+    def read(self, descriptor: int, size: int, offset: int) -> memoryview:
+        """Bytes of a file, fewer where it ends."""
+        if len(self._read) < size:
+            self._read = bytearray(size * 5 // 4)
+        view = memoryview(self._read)[:size]
+        return view[: os.preadv(descriptor, [view], offset)]
 
     def signals(self, columns: int, rows: int) -> Array:
         """An array (columns, rows) with anything in."""
@@ -132,48 +142,54 @@ class Cutter:
         """The samples in some chunks, and what of these is damaged."""
         damages: list[Cut | Damage] = []
         records = np.empty(0, np.uint8)
-        offsets: list[Integers] = []
+        indexes: list[bytes] = []
+        begins = [0]
+        read = partial(room.read, descriptor)
         for place in group:
-            chunk = read_chunk(self._file.path, descriptor, place)
+            chunk = read_chunk(self._file.path, read, place)
             if isinstance(chunk, Damage):
                 damages.append(chunk)
                 continue
-            found = self._offsets(place, chunk.records, chunk.indexes.get(self._channel, b''))
-            if found is None:
-                return self._each(descriptor, group)
-            if len(found):
-                offsets.append(found + len(records))
+            index = chunk.indexes.get(self._channel, b'')
+            if len(index) != self._index_size(place):
+                return self._each(read, group)
+            if index:
+                indexes.append(index)
                 # At once, so that its own memory is free for the next.
-                records = room.put(chunk.records, len(records))
-        if not offsets:
+                records = room.put(chunk.records, begins[-1])
+                begins.append(len(records))
+        if not indexes:
             return damages
-        cut = self._cut(records, np.concatenate(offsets), len(offsets), room)
-        return self._each(descriptor, group) if cut is None else [*damages, cut]
+        offsets = self._offsets(indexes, np.array(begins))
+        cut = None if offsets is None else self._cut(records, offsets, len(indexes), room)
+        return self._each(read, group) if cut is None else [*damages, cut]
 
-    def _offsets(self, place: ChunkPlace, records: bytes, index: bytes) -> Integers | None:
-        """Where the messages of the channel are in a chunk; None if that is unclear.
+    def _offsets(self, indexes: Sequence[bytes], begins: Integers) -> Integers | None:
+        """Where the messages of the channel are in chunks that are joined; None if unclear.
 
         No CRC covers a message index, but one covers the summary, which says how long it is. So
         entries that all lead to different messages of the channel lead to all of them.
-        """
-        count = self._count(place)
-        found = np.frombuffer(index, '<u8')[1::2].astype(np.int64)
-        if count is None or len(found) != count:
-            return None
-        size = len(self._head) + self._layout.size
-        if count and (found[0] < 0 or found[-1] > len(records) - size):
-            return None
-        return None if (found[1:] < found[:-1] + size).any() else found
 
-    def _count(self, place: ChunkPlace) -> int | None:
-        """How many blocks the summary tells of a chunk; None if it does not."""
+        Args:
+            indexes: Of the channel in each chunk.
+            begins: Where each chunk begins, and where the last one ends.
+        """
+        counts = [len(index) // 16 for index in indexes]
+        found = np.frombuffer(b''.join(indexes), '<u8')[1::2].astype(np.int64)
+        found += np.repeat(begins[:-1], counts)
+        size = len(self._head) + self._layout.size
+        outside = (found < np.repeat(begins[:-1], counts)) | (
+            found > np.repeat(begins[1:] - size, counts)
+        )
+        return None if outside.any() or (found[1:] < found[:-1] + size).any() else found
+
+    def _index_size(self, place: ChunkPlace) -> int:
+        """Bytes that the entries of the channel have by the summary; -1 if it does not tell."""
         if not place.indexes:
-            return None
+            return -1
         ends = place.index_of(self._channel)
-        if ends is None:
-            return 0
-        count, rest = divmod(ends[1] - ends[0] - _INDEX_HEAD, 16)
-        return None if rest or count < 0 else count
+        size = 0 if ends is None else ends[1] - ends[0] - _INDEX_HEAD
+        return -1 if size % 16 else size
 
     def _cut(
         self, records: NDArray[np.uint8], offsets: Integers, chunks: int, room: Room
@@ -206,11 +222,11 @@ class Cutter:
         told = np.full(len(offsets), rows)
         return Cut(self._names, out[:-1], out[-1], told, log_times)
 
-    def _each(self, descriptor: int, group: Iterable[ChunkPlace]) -> list[Cut | Damage]:
+    def _each(self, read: Read, group: Iterable[ChunkPlace]) -> list[Cut | Damage]:
         """The samples in some chunks by the way that takes any layout."""
         found: list[Cut | Damage] = []
         for place in group:
-            chunk = read_chunk(self._file.path, descriptor, place)
+            chunk = read_chunk(self._file.path, read, place)
             if isinstance(chunk, Damage):
                 found.append(chunk)
                 continue

@@ -15,6 +15,9 @@ _LARGER_THAN_STEP = 1.5
 """A step of time between two samples so many times the usual one is a gap."""
 
 
+_ALL = (-np.inf, np.inf)
+
+
 class Samples(NamedTuple):
     """The samples of one lathe.
 
@@ -64,9 +67,9 @@ class Seams:
 
     def follow(self, times: Array) -> None:
         """Go on with the times of more samples (n,), s."""
-        joined = np.concatenate((self._last, times))
-        self._last = joined[-1:]
-        steps = np.diff(joined)
+        joined = np.concatenate((self._last, times)) if len(self._last) else times
+        self._last = joined[-1:].copy()
+        steps = joined[1:] - joined[:-1]
         if not len(steps):
             return
         if self.step == 0.0:
@@ -105,7 +108,7 @@ def joined(cuts: Iterator[Cut], expected: int, start: float, end: float) -> Samp
             signals = _Signals(cut.columns, expected * int(cut.rows[0]))
         time, part = cut.times, cut.signals
         last = time[np.cumsum(cut.rows) - 1]
-        if start > time.min() or end < time.max():
+        if (start, end) != _ALL and (start > time.min() or end < time.max()):
             inside = (time >= start) & (time <= end)
             part, time = part[:, inside], time[inside]
             kept = (last >= start) & (last - (cut.rows - 1) * seams.step <= end)

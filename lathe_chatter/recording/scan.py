@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import struct
-import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +18,7 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
+from lathe_chatter.recording.crc import crc32
 from lathe_chatter.recording.summary import ChunkPlace
 
 _HEAD = struct.Struct('<BQ')
@@ -34,6 +34,9 @@ _BEFORE_SIGN = _HEAD.size + _CHUNK.size - 4
 
 _Fields = tuple[int, int, int, int, str, int]
 """First and last log time, size, CRC and compression of a chunk, and where its data begin."""
+
+Read = Callable[[int, int], memoryview]
+"""Reads so many bytes from an offset of a file, fewer where it ends."""
 
 Wanted = Callable[[int, int], bool]
 """Whether a chunk is wanted, by its first and last log time in ns."""
@@ -107,22 +110,22 @@ def scan(file: Path, wanted: Wanted | None = None) -> Iterator[Chunk | Plain | D
         os.close(descriptor)
 
 
-def read_chunk(file: Path, descriptor: int, place: ChunkPlace) -> Chunk | Damage:
+def read_chunk(file: Path, read: Read, place: ChunkPlace) -> Chunk | Damage:
     """A chunk that an index names with its message indexes, or what is wrong with it.
 
     Args:
         file: Its name.
-        descriptor: Open for reading.
+        read: Reads so many bytes from an offset of it, fewer where it ends.
         place: Where it is.
     """
     try:
-        return _chunk_at(descriptor, place)
+        return _chunk_at(read, place)
     except _BadChunkError as error:
         return Damage(file, place.offset, place.offset + place.length, str(error))
 
 
-def _chunk_at(descriptor: int, place: ChunkPlace) -> Chunk:
-    whole = memoryview(os.pread(descriptor, place.length + place.index_length, place.offset))
+def _chunk_at(read: Read, place: ChunkPlace) -> Chunk:
+    whole = read(place.length + place.index_length, place.offset)
     data, indexes = whole[: place.length], whole[place.length :]
     if len(data) < place.length or len(data) < _HEAD.size + _CHUNK.size:
         raise _BadChunkError('a chunk of the index is cut off')
@@ -305,6 +308,6 @@ def _decompressed(data: bytes | memoryview, name: str, size: int, crc: int) -> b
         raise _BadChunkError('a chunk cannot be decompressed') from None
     if len(records) != size:
         raise _BadChunkError('a chunk has not its size')
-    if crc and zlib.crc32(records) != crc:
+    if crc and crc32(records) != crc:
         raise _BadChunkError('a chunk does not have its CRC')
     return records

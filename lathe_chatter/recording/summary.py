@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import struct
-import zlib
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +13,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
+
+from lathe_chatter.recording.crc import crc32
 
 _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
@@ -91,7 +92,7 @@ def read_summary(file: Path) -> Summary | None:
             return None
         stream.seek(start)
         data = stream.read(size - length - start)
-    if crc and zlib.crc32(end[: _FOOTER.size - 4], zlib.crc32(data)) != crc:
+    if crc and crc32(end[: _FOOTER.size - 4], crc32(data)) != crc:
         return None
     try:
         return _parsed(data, start)
@@ -110,7 +111,7 @@ def body_is_sound(file: Path, summary: Summary) -> bool:
         crc = 0
         while left > 0:
             data = stream.read(min(left, _AT_ONCE))
-            crc = zlib.crc32(data, crc)
+            crc = crc32(data, crc)
             left -= len(data)
         end = stream.read(_DATA_END.size)
     if left < 0 or len(end) < _DATA_END.size:
