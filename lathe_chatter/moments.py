@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lathe_chatter.history import History
 from lathe_chatter.model import Array, BearingContact, Cut
@@ -78,14 +79,14 @@ class Moment:
     @property
     def out_of_cut(self) -> float:
         """Share of the samples in which the tool cuts no chip."""
-        return float(np.mean(self.portrait['chip_thickness'] <= 0.0))
+        return _share(self.portrait['chip_thickness'] <= 0.0)
 
     @property
     def on_bearing(self) -> float:
         """Share of the samples in which the bearing carries."""
         if self.cut.bearing_contact is BearingContact.GAP:
             touching = self.portrait['workpiece_displacement'] >= self.cut.bearing_clearance
-            return float(np.mean(touching))
+            return _share(touching)
         return float(self.cut.bearing_contact is BearingContact.SEATED)
 
     def spectrum(self, name: str) -> Spectrum:
@@ -177,3 +178,8 @@ def once_per_turn(time: Array, angle: Array, displacement: Array, velocity: Arra
     place = x + s * (u + s * (bend + s * twist))
     slope = u + s * (2.0 * bend + s * 3.0 * twist)
     return Section(place, slope / step)
+
+
+def _share(those: NDArray[np.bool_]) -> float:
+    """How many of some samples are those; nan of none."""
+    return float(those.mean()) if those.size else math.nan

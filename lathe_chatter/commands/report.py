@@ -64,7 +64,8 @@ def show_run(history: History, console: Console) -> dict[str, Any]:
         'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and\n'
         'as the rightmost characteristic root has them, of the machine open and on its bearing.'
     )
-    picture = history.path / PICTURE
+    folder = history.path if history.path.is_dir() else history.path.parent
+    picture = folder / PICTURE
     draw_run(history, picture)
     console.print(f'run      {history.path}\npicture  {picture}', soft_wrap=True)
     return {

@@ -18,7 +18,7 @@ from lathe_chatter.model import Array
 from lathe_chatter.recording.frames import UNITS, optional
 from lathe_chatter.recording.reader import Run, RunReadError
 from lathe_chatter.recording.ros_messages import topic_of_type
-from lathe_chatter.recording.sample_series import Seams
+from lathe_chatter.recording.sample_series import Seams, at
 from lathe_chatter.recording.writer import RunWriter
 
 NUMBER_TYPE = 'std_msgs/msg/Float64'
@@ -207,6 +207,6 @@ def _new(path: Path) -> Path:
 def seam_sentences(exported: Exported) -> Iterable[str]:
     """What is to be known of samples that do not follow each other."""
     for before, after in exported.seams.gaps:
-        yield f'samples are missing between {before:.6f} s and {after:.6f} s.'
+        yield f'samples are missing between {at(before)} and {at(after)}.'
     for before, after in exported.seams.restarts:
-        yield f'simulated time goes back from {before:.6f} s to {after:.6f} s.'
+        yield f'simulated time goes back from {at(before)} to {at(after)}.'

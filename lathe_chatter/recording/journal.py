@@ -18,6 +18,7 @@ from lathe_chatter.continuity import Continuity
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.ros_messages import LOG_TYPE, types
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Layout, layout_of
+from lathe_chatter.recording.sample_series import missing_in
 
 FLAG_TYPE = 'std_msgs/msg/Bool'
 _FLAG_BYTE = 4
@@ -64,12 +65,15 @@ class SamplesHeard:
             return
         if not len(times):
             return
+        if not np.isfinite(times).all():
+            self.complaint = 'The times of samples are no numbers.'
+            return
         self.continuity.join(times)
         last = float(times[-1])
         if self.first is None:
             self.first = float(times[0])
             step = (last - self.first) / (len(times) - 1) if len(times) > 1 else self.first
-            self.head = max(round(self.first / step) - 1, 0) if step > 0.0 else 0
+            self.head = max(missing_in((0.0, self.first), step), 0) if step > 0.0 else 0
         self._came.append((log_time, last))
         self._follow(publish_time)
 

@@ -18,8 +18,10 @@ from mcap.records import Attachment, Metadata
 
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
 from lathe_chatter.recording.scan import Chunk, Damage, Plain, Wanted, scan
-from lathe_chatter.recording.summary import Summary, add_record, read_summary
+from lathe_chatter.recording.summary import Summary, add_record, body_is_sound, read_summary
 
+_RECORD = struct.Struct('<BQ')
+_LOOSE_AT_ONCE = 1 << 20
 _UNREADABLE = (ValueError, EndOfFile, struct.error)
 """What parsing a record raises whose content is not of its kind."""
 
@@ -62,6 +64,7 @@ class RecordedFile:
         summary = read_summary(path)
         self.has_summary = summary is not None
         self.known = summary or Summary(0)
+        self._sound = False
 
     def topics(self) -> dict[str, str]:
         """The type of each topic by name; a file without a summary is walked for it."""
@@ -83,18 +86,48 @@ class RecordedFile:
         return sum(statistics.channel_message_counts.get(number, 0) for number in numbers)
 
     def contents(self, wanted: Wanted | None = None) -> Iterator[Contents]:
-        """The messages of each sound chunk; schemas and channels are known before they come."""
+        """The messages of each sound chunk; schemas and channels are known before they come.
+
+        A file may have messages outside of chunks; these come many at a time.
+        """
+        loose = bytearray()
         for found in scan(self.path, wanted):
+            if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
+                if not loose:
+                    self._trust_loose(found)
+                loose += _RECORD.pack(found.opcode, len(found.content)) + found.content
+                if len(loose) < _LOOSE_AT_ONCE:
+                    continue
+            if loose:
+                yield from self._loose(bytes(loose))
+                loose.clear()
             if isinstance(found, Chunk):
-                contents = self._opened(found)
-                if contents is not None:
-                    yield contents
-            elif isinstance(found, Damage):
-                self.on_damage(found)
-            elif not self.has_summary and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                # No CRC covers what stands outside of chunks: only where there is nothing better.
-                with contextlib.suppress(*_UNREADABLE):
-                    add_record(self.known, found.opcode, found.content)
+                yield from self._opened(found)
+            else:
+                self._learn(found)
+        if loose:
+            yield from self._loose(bytes(loose))
+
+    def _learn(self, found: Plain | Damage) -> None:
+        """Take note of what is no message."""
+        if isinstance(found, Damage):
+            self.on_damage(found)
+        elif not self.has_summary and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            # No CRC covers what stands outside of chunks: only where there is nothing better.
+            with contextlib.suppress(*_UNREADABLE):
+                add_record(self.known, found.opcode, found.content)
+
+    def _trust_loose(self, first: Plain) -> None:
+        """Messages outside of chunks have no CRC but that of the whole file, if there is one."""
+        if self.has_summary and not self._sound and not body_is_sound(self.path, self.known):
+            reason = 'its messages have no CRC of their own, and that of the file is another'
+            self.on_damage(Damage(self.path, first.offset, self.known.start, reason))
+        self._sound = True  # asked once
+
+    def _loose(self, records: bytes) -> Iterator[Contents]:
+        for contents in self._opened(Chunk(0, 0, 0, records, {})):
+            first = int(contents.messages.heads['log_time'].min())
+            yield contents._replace(first=first)
 
     def notes(self) -> Iterator[Note]:
         """Every note, in order."""
@@ -114,7 +147,7 @@ class RecordedFile:
                     where = found.offset, found.offset + len(found.content)
                     self.on_damage(Damage(self.path, *where, 'a note cannot be read'))
 
-    def _opened(self, chunk: Chunk) -> Contents | None:
+    def _opened(self, chunk: Chunk) -> Iterator[Contents]:
         try:
             messages = messages_of(chunk)
             for offset in messages.others:
@@ -123,12 +156,12 @@ class RecordedFile:
                 add_record(self.known, opcode, content)
         except _UNREADABLE as error:
             self.on_damage(Damage(self.path, chunk.offset, chunk.offset, str(error)))
-            return None
+            return
         unknown = set(np.unique(messages.heads['channel']).tolist()) - set(self.known.channels)
         if unknown:
             reason = f'its messages of channel {min(unknown)} are of a topic that nothing names'
             self.on_damage(Damage(self.path, chunk.offset, chunk.offset, reason))
-        return Contents(chunk.first, messages)
+        yield Contents(chunk.first, messages)
 
 
 def offers_of(channel: Any) -> list[dict[str, Any]]:

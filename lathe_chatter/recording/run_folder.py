@@ -48,10 +48,16 @@ def run_folder(folder: Path) -> RunFolder:
     """
     if not folder.is_dir():
         raise RunReadError(f'{folder} does not exist.')
+    metadata, listed = _described(folder)
+    mode = str((metadata or {}).get('compression_mode') or 'none').lower()
+    if mode != 'none':
+        raise RunReadError(
+            f'{folder} is compressed by {mode}, beyond what MCAP itself does, and is not read: '
+            '`ros2 bag convert` makes a plain one of it.'
+        )
     there = sorted((file for file in folder.glob('*.mcap') if file.is_file()), key=_split)
     if not there:
         raise RunReadError(f'{folder} holds no recorded run.')
-    metadata, listed = _described(folder)
     runs = {_split(Path(name))[0] for name in listed} or {_split(file)[0] for file in there}
     if not listed and len(runs) > 1:
         names = ', '.join(sorted(runs))

@@ -151,7 +151,7 @@ class Cutter:
                 damages.append(chunk)
                 continue
             index = chunk.indexes.get(self._channel, b'')
-            if len(index) != self._index_size(place):
+            if len(index) != index_size(place, self._channel):
                 return self._each(read, group)
             if index:
                 indexes.append(index)
@@ -182,14 +182,6 @@ class Cutter:
             found > np.repeat(begins[1:] - size, counts)
         )
         return None if outside.any() or (found[1:] < found[:-1] + size).any() else found
-
-    def _index_size(self, place: ChunkPlace) -> int:
-        """Bytes that the entries of the channel have by the summary; -1 if it does not tell."""
-        if not place.indexes:
-            return -1
-        ends = place.index_of(self._channel)
-        size = 0 if ends is None else ends[1] - ends[0] - _INDEX_HEAD
-        return -1 if size % 16 else size
 
     def _cut(
         self, records: NDArray[np.uint8], offsets: Integers, chunks: int, room: Room
@@ -238,6 +230,15 @@ class Cutter:
                 continue
             found += [cut_of(blocks, self._wanted) for blocks in blocks_of(messages)]
         return found
+
+
+def index_size(place: ChunkPlace, channel: int) -> int:
+    """Bytes that the entries of a channel have by the summary; -1 if it does not tell."""
+    if not place.indexes:
+        return -1
+    ends = place.index_of(channel)
+    size = 0 if ends is None else ends[1] - ends[0] - _INDEX_HEAD
+    return -1 if size % 16 else size
 
 
 def _pieces(records: NDArray[np.uint8], starts: Integers, size: int) -> NDArray[np.uint8]:

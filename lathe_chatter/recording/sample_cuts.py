@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.recording.sample_blocks import Layout, layout_of
-from lathe_chatter.recording.sample_columns import Cut, Cutter, Room
+from lathe_chatter.recording.sample_columns import Cut, Cutter, Room, index_size
 from lathe_chatter.recording.scan import Damage
 
 _AT_ONCE = 16
@@ -28,13 +28,17 @@ def cuts_by_index(
     Every chunk is proven by its CRC, as when the file is walked.
 
     Returns:
-        None where the file has no index, or so few blocks that a walk is quicker.
+        None where the file has no index or one of a part of it, or so few blocks that a walk is
+        quicker.
 
     Raises:
         OSError: If the file cannot be read.
     """
     numbers = [n for n, channel in file.known.channels.items() if channel.topic == topic]
-    if len(numbers) != 1 or not file.known.chunks or file.count(topic) < _WORTHWHILE:
+    count = file.count(topic)
+    if len(numbers) != 1 or not file.known.chunks or count < _WORTHWHILE:
+        return None
+    if sum(index_size(place, numbers[0]) for place in file.known.chunks) != 16 * count:
         return None
     layout, head = _first_layout(file, numbers[0])
     if layout is None:

@@ -15,6 +15,8 @@ _LARGER_THAN_STEP = 1.5
 """A step of time between two samples so many times the usual one is a gap."""
 
 
+_COUNTABLE = 1e12
+"""Of samples and seconds: more are no count and no time, but a damaged number."""
 _ALL = (-np.inf, np.inf)
 
 
@@ -73,16 +75,30 @@ class Seams:
         if not len(steps):
             return
         if self.step == 0.0:
-            self.step = float(np.median(steps))
+            usual = float(np.median(steps))
+            self.step = usual if 0.0 < usual < np.inf else 0.0
         if steps.min() > 0.0 and steps.max() <= _LARGER_THAN_STEP * self.step:
             return
-        for place in np.flatnonzero((steps > _LARGER_THAN_STEP * self.step) | (steps <= 0.0)):
+        # So that a time which is no number is a seam too.
+        forward = steps > 0.0
+        for place in np.flatnonzero(~(forward & (steps <= _LARGER_THAN_STEP * self.step))):
             seam = float(joined[place]), float(joined[place + 1])
-            if steps[place] <= 0.0:
+            if not forward[place]:
                 self.restarts.append(seam)
             else:
                 self.gaps.append(seam)
-                self.lost += round(float(steps[place]) / self.step) - 1
+                self.lost += missing_in(seam, self.step)
+
+
+def missing_in(gap: tuple[float, float], step: float) -> int:
+    """How many samples are missing in a gap, by its ends and the usual step, s; 0 if unknown."""
+    count = (gap[1] - gap[0]) / step if step else np.inf
+    return round(count) - 1 if count < _COUNTABLE else 0
+
+
+def at(time: float) -> str:
+    """A simulated time for people, s."""
+    return f'{time:.6f} s' if abs(time) < _COUNTABLE else f'{time!r} s'
 
 
 def joined(cuts: Iterator[Cut], expected: int, start: float, end: float) -> Samples | None:

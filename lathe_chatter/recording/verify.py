@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
+import numpy as np
+
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.completeness import (
     check_end,
@@ -20,7 +22,7 @@ from lathe_chatter.recording.numbering import Numbering
 from lathe_chatter.recording.reader import Run, read_run
 from lathe_chatter.recording.recorded_file import Note, RecordedFile, offers_of
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
-from lathe_chatter.recording.sample_series import Seams
+from lathe_chatter.recording.sample_series import Seams, at, missing_in
 from lathe_chatter.recording.verification import Finding, SampleCount, Verification
 
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']
@@ -83,12 +85,13 @@ def _check_samples(found: Verification) -> None:
         if kind != SAMPLES_TYPE or not topic.endswith('/samples'):
             continue
         seams = Seams()
-        count, first, last = 0, math.nan, math.nan
+        count, first, last, strange = 0, math.nan, math.nan, 0
         try:
             for block in found.run.sample_blocks(topic):
                 times = block.samples[:, block.columns.index('time')]
                 if not len(times):
                     continue
+                strange += int(np.count_nonzero(~np.isfinite(times)))
                 seams.follow(times)
                 first = float(times[0]) if not count else first
                 last = float(times[-1])
@@ -96,22 +99,23 @@ def _check_samples(found: Verification) -> None:
         except (LayoutError, ValueError) as error:
             found.lose(f'{topic}: {error}')
         found.samples[topic] = SampleCount(count, first, last)
-        late = round(first / seams.step) - 1 if count and seams.step else 0
+        if strange:
+            found.lose(f'{topic}: the times of {strange} samples are no numbers.')
+        late = missing_in((0.0, first), seams.step) if count and seams.step else 0
         if late > 0:
             found.remark(
-                f'{topic}: the record begins at {first:.6f} s of simulated time, {late} samples '
+                f'{topic}: the record begins at {at(first)} of simulated time, {late} samples '
                 'late.'
             )
-        for before, after in seams.gaps:
-            missing = round((after - before) / seams.step) - 1
+        for gap in seams.gaps:
             found.lose(
-                f'{topic}: {missing} samples are missing between {before:.6f} s and {after:.6f} s '
-                'of simulated time.'
+                f'{topic}: {missing_in(gap, seams.step) or "some"} samples are missing between '
+                f'{at(gap[0])} and {at(gap[1])} of simulated time.'
             )
         for before, after in seams.restarts:
             found.remark(
-                f'{topic}: simulated time goes back from {before:.6f} s to {after:.6f} s: the '
-                'lathe was reset or started again.'
+                f'{topic}: simulated time goes back from {at(before)} to {at(after)}: the lathe '
+                'was reset or started again.'
             )
 
 
