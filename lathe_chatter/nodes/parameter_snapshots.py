@@ -1,4 +1,4 @@
-"""The parameters of other nodes, asked for once and without waiting."""
+"""The parameters of other nodes, asked for without waiting until they are known."""
 
 from __future__ import annotations
 
@@ -14,6 +14,11 @@ from rclpy.parameter import parameter_value_to_python
 _SETTLING = 1.0
 """s from when this node has found the services of another to when the other has found it too: an
 answer to a client that it does not know yet would hold the other up."""
+
+_UNKNOWN = '_UNKNOWN_'
+"""In the name of a node of which the graph has a publisher before it has the name."""
+_PATIENCE = 1.0
+"""s after which an unanswered node is asked again: on a busy machine answers may be lost."""
 
 Tell = Callable[[str, dict[str, Any]], None]
 """Takes the full name of a node and its parameters."""
@@ -32,11 +37,14 @@ class ParameterSnapshots:
         self._node = node
         self._tell = tell
         self._wanted: dict[str, tuple[Client, Client]] = {}
-        self._found: dict[str, float] = {}
+        self._due: dict[str, float] = {}
         self._known: set[str] = set()
 
-    def want(self, name: str) -> None:
-        """Ask a node, by its full name, for its parameters; again is not asked."""
+    def want(self, namespace: str, node_name: str) -> None:
+        """Ask a node for its parameters, once the graph knows its name; again is not asked."""
+        if _UNKNOWN in node_name:
+            return
+        name = f'{namespace.rstrip("/")}/{node_name}'  # a namespace is / or ends without one
         if name in self._known or name == self._node.get_fully_qualified_name():
             return
         self._known.add(name)
@@ -46,21 +54,26 @@ class ParameterSnapshots:
         )
 
     def look(self) -> None:
-        """Ask those that can answer by now."""
+        """Ask those that can answer by now, and have not."""
+        now = time.monotonic()
         for name, clients in list(self._wanted.items()):
             if not all(client.service_is_ready() for client in clients):
-                self._found.pop(name, None)
-            elif time.monotonic() - self._found.setdefault(name, time.monotonic()) > _SETTLING:
-                del self._wanted[name]
+                self._due.pop(name, None)
+            elif now > self._due.setdefault(name, now + _SETTLING):
+                self._due[name] = now + _PATIENCE
                 self._list(name, *clients)
 
     def _list(self, name: str, lister: Client, getter: Client) -> None:
         def got(future: Any) -> None:
+            if name not in self._wanted:  # answered meanwhile
+                return
             names = list(future.result().result.names)
             request = GetParameters.Request(names=names)
             getter.call_async(request).add_done_callback(lambda f: values(f, names))
 
         def values(future: Any, names: list[str]) -> None:
+            if self._wanted.pop(name, None) is None:
+                return
             found = [parameter_value_to_python(value) for value in future.result().values]
             self._node.destroy_client(lister)
             self._node.destroy_client(getter)

@@ -27,6 +27,7 @@ from lathe_chatter.recording.closing import SUMMARY, closing_summary
 from lathe_chatter.recording.identity import (
     IDENTITY,
     PARAMETERS,
+    PUBLISHERS,
     RECEPTION,
     STALLS,
     identity,
@@ -40,7 +41,6 @@ _DRAIN_PERIOD = 0.02
 """s between two times that what has arrived is taken."""
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
-_MEDIA_TYPES = {'.yaml': 'application/yaml', '.json': 'application/json', '.txt': 'text/plain'}
 _FAILED = 1
 
 
@@ -125,6 +125,7 @@ class RecorderNode(ParameterNode):
         self._refused.clear()
         self._journal, self._stalls = Journal(), Stalls()
         self._noted: dict[str, dict[str, Any]] = {}
+        self._most_publishers: dict[str, int] = {}
         self._snapshots = ParameterSnapshots(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
         self._writer.note(IDENTITY, {**identity(), 'middleware': middleware})
@@ -135,15 +136,11 @@ class RecorderNode(ParameterNode):
         return folder
 
     def _attach(self, file: Path) -> None:
-        """Put a file into the run as it is."""
         try:
-            data = file.read_bytes()
+            if self._writer is not None:
+                self._writer.attach_file(file)
         except OSError as error:
             self.get_logger().warning(f'{file} is not attached to the run: {error}.')
-            return
-        if self._writer is not None:
-            kind = _MEDIA_TYPES.get(file.suffix, 'application/octet-stream')
-            self._writer.attach(file.name, kind, data)
 
     def stop(self) -> str:
         """Finish the run, with everything that has arrived; a sentence about it."""
@@ -195,6 +192,12 @@ class RecorderNode(ParameterNode):
                 self._topics[name].look(offers)
             elif offers:
                 self._join(name, offers)
+            for offer in offers:
+                self._snapshots.want(offer.node_namespace, offer.node_name)
+            if len(offers) > self._most_publishers.get(name, 0):
+                self._most_publishers[name] = len(offers)
+                counts = {each: str(count) for each, count in self._most_publishers.items()}
+                self._writer.note(PUBLISHERS, counts)
         self._snapshots.look()
 
     def _join(self, name: str, offers: list[Any]) -> None:
@@ -208,9 +211,6 @@ class RecorderNode(ParameterNode):
             return
         self._writer.add_topic(topic)
         self._topics[name] = RecordedTopic(self, topic, offers, self._write)
-        for offer in offers:
-            # The namespace is / or ends without one.
-            self._snapshots.want(f'{offer.node_namespace.rstrip("/")}/{offer.node_name}')
 
     def _drain(self) -> None:
         """Take what has arrived."""

@@ -115,12 +115,19 @@ def run_node(
         sys.stderr.write(f'{error}\n')
         raise SystemExit(2) from None
     finally:
-        try:
-            if node is not None:
+        _finish(node)
+
+
+def _finish(node: Node | None) -> None:
+    """End a node, whatever fails on the way, and then rclpy."""
+    try:
+        if node is not None:
+            try:
                 _deliver(node)
+            finally:
                 node.destroy_node()
-        finally:
-            rclpy.try_shutdown()
+    finally:
+        rclpy.try_shutdown()
 
 
 def _deliver(node: Node) -> None:

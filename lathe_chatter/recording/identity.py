@@ -20,6 +20,9 @@ PARAMETERS = 'lathe_chatter/parameters'
 RECEPTION = 'lathe_chatter/reception'
 """Name of the record of what came and what was lost on the way, by topic, as JSON."""
 
+PUBLISHERS = 'lathe_chatter/publishers'
+"""Name of the record of how many publishers each topic had at most, as JSON."""
+
 STALLS = 'stalls'
 """Among these, how often the recorder took too long to take what had come."""
 

@@ -17,7 +17,7 @@ from lathe_chatter.recording.completeness import (
     check_order,
     noted,
 )
-from lathe_chatter.recording.identity import RECEPTION, STALLS
+from lathe_chatter.recording.identity import PUBLISHERS, RECEPTION, STALLS
 from lathe_chatter.recording.numbering import Numbering
 from lathe_chatter.recording.reader import Run, read_run
 from lathe_chatter.recording.recorded_file import Note, RecordedFile, offers_of
@@ -71,11 +71,16 @@ def _check_messages(found: Verification) -> dict[str, Numbering]:
 
 
 def _publishers(run: Run) -> dict[str, int]:
-    """How many publishers each topic had when it was found."""
+    """How many publishers each topic had when it was found, or at most where that was noted."""
     numbers: dict[str, int] = {}
     for path in run.files:
         for channel in RecordedFile(path, lambda _damage: None).known.channels.values():
             numbers[channel.topic] = max(len(offers_of(channel)), 1)
+    for note in run.notes():
+        for topic in note.values if note.name == PUBLISHERS else ():
+            count = noted(note, topic)
+            if isinstance(count, int):
+                numbers[topic] = max(count, numbers.get(topic, 1))
     return numbers
 
 

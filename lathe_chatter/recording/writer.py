@@ -18,6 +18,7 @@ from lathe_chatter.recording.topic_records import TopicTable
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
 
+_MEDIA_TYPES = {'.yaml': 'application/yaml', '.json': 'application/json', '.txt': 'text/plain'}
 _CHUNK_SIZE = 1 << 22
 """Larger than what comes between two commits, which each end a chunk."""
 
@@ -105,6 +106,15 @@ class RunWriter:
         """Attach a file of another kind, a scenario for instance."""
         self._send_chunk()
         self._background.soon(lambda: self._files.attach(name, media_type, data))
+
+    def attach_file(self, file: Path) -> None:
+        """Attach a file as it is.
+
+        Raises:
+            OSError: If it cannot be read.
+        """
+        kind = _MEDIA_TYPES.get(file.suffix, 'application/octet-stream')
+        self.attach(file.name, kind, file.read_bytes())
 
     def commit(self) -> None:
         """Leave a complete file on disk with everything written so far; split where it is time.

@@ -261,3 +261,38 @@ def test_a_reset_before_the_first_sample_that_was_recorded(tmp_path: Path) -> No
         lathe.advance(60)  # not recorded either
         run.take(lathe.advance(100))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=100)
+
+
+def test_every_change_of_a_cut_can_be_told_and_done_again(tmp_path: Path) -> None:
+    """Ramps, contact, noise, speed variation: anything at any tick, in any order."""
+    generator = np.random.default_rng(8)
+    choices: dict[str, Callable[[], object]] = {
+        'spindle_speed_rpm': lambda: float(generator.uniform(2000.0, 8000.0)),
+        'depth_of_cut': lambda: float(generator.uniform(0.0, 0.001)),
+        'bearing_clearance': lambda: float(generator.uniform(0.0, 1e-5)),
+        'bearing_contact': lambda: str(generator.choice(['none', 'gap', 'seated'])),
+        'feed_speed': lambda: float(generator.uniform(0.0, 0.005)),
+        'force_noise': lambda: float(generator.choice([0.0, 1e-3 / 3.0])),
+        'sensor_noise': lambda: float(generator.choice([0.0, 1e-8 / 3.0])),
+        'runout': lambda: float(generator.uniform(0.0, 1e-6)),
+        'speed_variation_amplitude': lambda: float(generator.uniform(0.0, 0.3)),
+        'speed_variation_frequency': lambda: float(generator.uniform(0.5, 20.0)),
+    }
+    assert set(choices) == set(Cut.__dataclass_fields__)
+    lathe = VirtualLathe(seed=9, spindle_acceleration=5e4)
+    with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
+        run.tell(BEGINNING)
+        for _ in range(120):
+            if generator.uniform() < 0.5:
+                names = generator.choice(list(choices), size=2, replace=False).tolist()
+                cut = lathe.cut.with_changes(**{name: choices[name]() for name in names})
+                if sentence := change_sentence(lathe.time, lathe.cut, cut):
+                    run.tell(sentence)
+                lathe.retune(cut)
+            if generator.uniform() < 0.1:
+                impulse = float(generator.normal(scale=1e-3))
+                run.tell(knock_sentence(lathe.time, impulse))
+                lathe.knock(impulse)
+            run.take(lathe.advance(int(generator.integers(1, 60))))
+    found = again(tmp_path / 'run')
+    assert found == Resimulation('/lathe/samples', compared=lathe.samples_taken)
