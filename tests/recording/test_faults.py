@@ -17,6 +17,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Array
 from lathe_chatter.recording import RunReadError, RunWriter, read_run, recover, verify
+from lathe_chatter.recording.identity import PUBLISHERS
 
 START = 1_700_000_000_000_000_000
 BLOCKS, PER_COMMIT = 60, 10
@@ -148,6 +149,21 @@ def test_losses_on_the_way_are_named_with_topic_and_interval(tmp_path: Path) -> 
     assert [finding.text for finding in verify(tmp_path / 'run').findings] == [
         '/numbers: 4 messages are missing between 22:13:23.000000 UTC and 22:13:28.000000 UTC.'
     ]
+
+
+@pytest.mark.parametrize(('publishers', 'losses'), [(None, 1), (2, 0)])
+def test_numbers_of_a_publisher_that_was_found_later_are_no_loss(
+    publishers: int | None, losses: int, tmp_path: Path
+) -> None:
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.add_topic(topic('/numbers'))
+        if publishers is not None:
+            writer.note(PUBLISHERS, {'/numbers': str(publishers)})
+        for second, sequence in ((0, 1), (2, 5), (4, 6), (6, 7)):
+            time = START + second * 10**9
+            told = {'log_time': time, 'publish_time': time, 'sequence': sequence}
+            writer.write('/numbers', number(sequence), **told)
+    assert len(verify(tmp_path / 'run').findings) == losses
 
 
 def test_a_run_whose_recorder_was_killed_says_where_it_ends(
