@@ -7,8 +7,9 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import Progress
 
-from lathe_chatter.recording import RunReadError, resimulate, verify
+from lathe_chatter.recording import RunReadError, Verification, read_run, resimulate, verify
 from lathe_chatter.recording.resimulate import finding_of
 
 NAME = 'verify'
@@ -29,13 +30,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Verify; 0 if nothing is missing, else 1."""
-    found = verify(options.run_path)
-    if options.resimulate:
-        try:
-            found.findings += [finding_of(again) for again in resimulate(found.run)]
-        except RunReadError:
-            if found.complete:  # else there are reasons enough
-                raise
+    found = _verified(options.run_path, again=options.resimulate)
     console = Console(highlight=False, soft_wrap=True)
     if options.json:
         figures = {
@@ -55,3 +50,20 @@ def run(options: Namespace) -> int:
         console.print(('WRONG  ' if finding.loss else 'note   ') + finding.text, markup=False)
     console.print('complete' if found.complete else 'NOT complete')
     return 0 if found.complete else 1
+
+
+def _verified(path: Path, *, again: bool) -> Verification:
+    """What is found in a run, and what comes of computing it again if that is wanted."""
+    # Nearly all of what a lathe's run has are its samples, which are looked at twice.
+    total = 2 * read_run(path, damaged=True).count_of_messages()
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task('messages', total=total or None)
+        found = verify(path, lambda count: progress.advance(bar, count))
+        if again:
+            progress.update(bar, description='computing again', total=None)
+            try:
+                found.findings += [finding_of(each) for each in resimulate(found.run)]
+            except RunReadError:
+                if found.complete:  # else there are reasons enough
+                    raise
+    return found

@@ -8,7 +8,12 @@ publishers, one ended and another went on in its place, and what lies between wa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter.model import Array, Integers
 
 _SETTLING = 1.0
 """s that a new publisher may be heard before the graph has it."""
@@ -59,13 +64,26 @@ class Numbering:
 
     def take(self, number: int, now: float) -> None:
         """A message came, at a steady time in s."""
+        self._take_all(number, number, now, now)
+
+    def take_many(self, numbers: Integers, times: Array) -> None:
+        """Messages came in this order, (n,) and (n,) s: as quick as they follow each other."""
+        breaks = np.flatnonzero(np.diff(numbers) != 1) + 1
+        for first, after in pairwise((0, *breaks.tolist(), len(numbers))):
+            last = after - 1
+            self._take_all(
+                int(numbers[first]), int(numbers[last]), float(times[first]), float(times[last])
+            )
+
+    def _take_all(self, first: int, last: int, begun: float, heard: float) -> None:
+        """Messages of one publisher that follow each other."""
         for sequence in self._sequences:
-            if sequence.last == number - 1:
-                sequence.last, sequence.heard = number, now
+            if sequence.last == first - 1:
+                sequence.last, sequence.heard = last, heard
                 return
         if not self._sequences:
-            self.before = number - 1
-        self._sequences.append(_Sequence(number, number, now, now))
+            self.before = first - 1
+        self._sequences.append(_Sequence(first, last, begun, heard))
 
     def settle(self, publishers: int, now: float) -> None:
         """Conclude what has been lost, where the graph is known to have so many publishers.

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.recording.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.frames import to_pandas, to_xarray
-from lathe_chatter.recording.recorded_file import Note, RecordedFile
+from lathe_chatter.recording.recorded_file import Contents, Note, RecordedFile
 from lathe_chatter.recording.run_folder import RunFolder, RunReadError, run_folder
 from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
 from lathe_chatter.recording.sample_columns import Cut, cut_of
@@ -105,6 +105,21 @@ class Run:
     def attachments(self) -> list[Any]:
         """Files that were kept in the run, as mcap has them: name, media_type, data."""
         return [each for file in self._opened() for each in file.attachments()]
+
+    def contents(self) -> Iterator[tuple[RecordedFile, Contents]]:
+        """The messages of each chunk of each file, as arrays, in the order of the files.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
+        for file in self._opened():
+            for contents in file.contents():
+                yield file, contents
+
+    def count_of_messages(self) -> int:
+        """How many messages the files say that they have; 0 where they do not say."""
+        known = [file.known.statistics for file in self._opened()]
+        return sum(statistics.message_count for statistics in known if statistics is not None)
 
     def raw_messages(self, *topics: str) -> Iterator[Raw]:
         """The messages of some topics, or of all if none is named, as they are in the file.

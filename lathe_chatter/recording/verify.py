@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -28,16 +28,24 @@ from lathe_chatter.recording.verification import Finding, SampleCount, Verificat
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']
 
 
-def verify(path: Path | str) -> Verification:
+Progress = Callable[[int], None]
+"""Told how many messages have been looked at since it was told last."""
+
+
+def verify(path: Path | str, progress: Progress = lambda _count: None) -> Verification:
     """Look at every byte of a run, also one of another recorder, and at what its payload tells.
+
+    Args:
+        path: A folder or a file.
+        progress: Told of every message once, and again of those with samples.
 
     Raises:
         RunReadError: If there is no such run.
     """
     found = Verification(read_run(path, damaged=True))
-    numberings = _check_messages(found)
+    numberings = _check_messages(found, progress)
     check_files(found)
-    _check_samples(found)
+    _check_samples(found, progress)
     notes = found.run.notes()
     check_end(found, notes)
     check_order(found)
@@ -46,15 +54,25 @@ def verify(path: Path | str) -> Verification:
     return found
 
 
-def _check_messages(found: Verification) -> dict[str, Numbering]:
+def _check_messages(found: Verification, progress: Progress) -> dict[str, Numbering]:
     """Read all there is, and follow the numbers that publishers gave."""
     numberings: dict[str, Numbering] = {}
-    for raw in found.run.raw_messages():
-        found.messages[raw.topic] += 1
-        found.last[raw.topic] = raw.log_time
-        if raw.sequence:
-            numbering = numberings.setdefault(raw.topic, Numbering())
-            numbering.take(raw.sequence, raw.log_time / 1e9)
+    for file, contents in found.run.contents():
+        heads = contents.messages.heads
+        for number in np.unique(heads['channel']).tolist():
+            channel = file.known.channels.get(number)
+            if channel is None or channel.schema_id not in file.known.schemas:
+                continue  # told as damage
+            of_it = heads[heads['channel'] == number]
+            found.messages[channel.topic] += len(of_it)
+            last = int(of_it['log_time'].max())
+            found.last[channel.topic] = max(last, found.last.get(channel.topic, last))
+            numbered = of_it[of_it['sequence'] > 0]
+            if len(numbered):
+                numbering = numberings.setdefault(channel.topic, Numbering())
+                times = numbered['log_time'].astype(float) / 1e9
+                numbering.take_many(numbered['sequence'].astype(np.int64), times)
+        progress(len(heads))
     publishers = _publishers(found.run)
     for topic, numbering in sorted(numberings.items()):
         numbering.settle(publishers.get(topic, 1), math.inf)
@@ -84,7 +102,7 @@ def _publishers(run: Run) -> dict[str, int]:
     return numbers
 
 
-def _check_samples(found: Verification) -> None:
+def _check_samples(found: Verification, progress: Progress) -> None:
     """That the samples follow each other, by their own times."""
     for topic, kind in sorted(found.run.topics.items()):
         if kind != SAMPLES_TYPE or not topic.endswith('/samples'):
@@ -93,6 +111,7 @@ def _check_samples(found: Verification) -> None:
         count, first, last, strange = 0, math.nan, math.nan, 0
         try:
             for block in found.run.sample_blocks(topic):
+                progress(len(block.rows))
                 times = block.samples[:, block.columns.index('time')]
                 if not len(times):
                     continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from lathe_chatter.recording.numbering import Loss, Numbering
 
@@ -69,3 +70,26 @@ def test_a_gap_of_one_publisher_among_others_is_found() -> None:
     second = iter(range(1000, 1200))
     mixed = [number for pair in zip(first, second, strict=False) for number in pair]
     assert follow(mixed, 2) == 10
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_many_at_once_are_as_one_after_the_other(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    numbers: list[int] = []
+    reached = [0, 40]  # of two publishers, with losses now and then
+    for _ in range(30):
+        who = int(generator.integers(2))
+        reached[who] += int(generator.choice([0, 0, 0, 3]))
+        count = int(generator.integers(1, 6))
+        numbers += range(reached[who] + 1, reached[who] + count + 1)
+        reached[who] += count
+    times = np.arange(len(numbers)) * 0.5
+    single, many = Numbering(), Numbering()
+    for number, time in zip(numbers, times.tolist(), strict=True):
+        single.take(number, time)
+    for part in np.array_split(np.arange(len(numbers)), 7):
+        many.take_many(np.array(numbers)[part], times[part])
+    for each in (single, many):
+        each.settle(2, math.inf)
+    assert many.before == single.before
+    assert many.losses == single.losses
