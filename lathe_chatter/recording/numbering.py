@@ -70,10 +70,12 @@ class Numbering:
         """Messages came in this order, (n,) and (n,) s: as quick as they follow each other."""
         breaks = np.flatnonzero(np.diff(numbers) != 1) + 1
         for first, after in pairwise((0, *breaks.tolist(), len(numbers))):
-            last = after - 1
-            self._take_all(
-                int(numbers[first]), int(numbers[last]), float(times[first]), float(times[last])
-            )
+            lowest, highest = int(numbers[first]), int(numbers[after - 1])
+            if any(lowest <= each.last < highest for each in self._sequences):
+                for place in range(first, after):  # whose they are must be seen one by one
+                    self.take(int(numbers[place]), float(times[place]))
+                continue
+            self._take_all(lowest, highest, float(times[first]), float(times[after - 1]))
 
     def _take_all(self, first: int, last: int, begun: float, heard: float) -> None:
         """Messages of one publisher that follow each other."""
