@@ -150,11 +150,10 @@ class ParameterTable:
 
     def markdown(self) -> str:
         """The rows as the table of a README."""
-        head = (
-            '| parameter | default | unit | allowed | when | meaning |\n|---|---|---|---|---|---|'
-        )
+        head = '| parameter | default | allowed | when | meaning |\n|---|---|---|---|---|'
         lines = (
-            f'| `{row.name}` | {_shown(row.default)} | {row.unit} | {row.allowed} '
+            f'| `{row.name}` | {_shown(row.default)} '
+            f'| {row.allowed.replace("a finite number ", "")} '
             f'| {"run time" if row.run_time else "start"} | {row.meaning} |'
             for row in self
         )
@@ -193,5 +192,7 @@ def _shown(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):
-        return ', '.join(f'`{entry}`' for entry in value)
-    return f'`{value}`' if isinstance(value, str) and value else f'{value}'
+        return ', '.join(f'`{entry}`' for entry in value) or 'none'
+    if isinstance(value, str):
+        return f'`{value}`' if value else 'empty'
+    return f'{value}'

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -151,7 +154,22 @@ def test_the_table_of_a_readme_has_every_row() -> None:
     lines = LATHE.markdown().splitlines()
     assert len(lines) == 2 + len(list(LATHE))
     assert len({line.count('|') for line in lines}) == 1
-    assert (
-        '| `depth_of_cut` | 0.0005 | m | a finite number from 0 to 0.01 m | run time '
-        '| depth of cut w |'
-    ) in lines
+    assert ('| `depth_of_cut` | 0.0005 | from 0 to 0.01 m | run time | depth of cut w |') in lines
+
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def readme_tables(*arguments: str) -> int:
+    script = ROOT / 'scripts' / 'readme_tables'
+    return subprocess.run([sys.executable, script, *arguments], check=False).returncode
+
+
+def test_the_tables_of_the_readme_are_current(tmp_path: Path) -> None:
+    assert readme_tables('--check') == 0, 'run scripts/readme_tables'
+    old = (ROOT / 'README.md').read_text().replace('| `depth_of_cut` | 0.0005 |', '| `depth` | |')
+    copy = tmp_path / 'README.md'
+    copy.write_text(old)
+    assert readme_tables('--check', str(copy)) == 1
+    assert readme_tables(str(copy)) == 0
+    assert copy.read_text() == (ROOT / 'README.md').read_text()
