@@ -43,7 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, what the verb says (1 for a verdict that is no), 2 for a user's
         mistake, 130 when interrupted.
     """
-    signal.signal(signal.SIGTERM, _interrupt)
+    for wish in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(wish, _interrupt)
     options = parser().parse_args(arguments)
     try:
         code: int = options.run(options)
@@ -60,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
-    """End on SIGTERM as on Ctrl-C: what was begun is finished."""
+    """End on SIGTERM and SIGHUP as on Ctrl-C: what was begun is finished."""
     raise KeyboardInterrupt
 
 

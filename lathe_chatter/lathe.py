@@ -14,7 +14,7 @@ from lathe_chatter.integrator.preparation import constants_of
 from lathe_chatter.lathe_setup import LatheSetup
 from lathe_chatter.lathe_state import LatheState, StateError, differences
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine
-from lathe_chatter.quantities import Quantity
+from lathe_chatter.quantities import Quantity, count_of
 
 _IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
 
@@ -73,7 +73,7 @@ class VirtualLathe:
     ) -> None:
         """See the class."""
         setup = LatheSetup(
-            machine or Machine(),
+            Machine() if machine is None else machine,
             sample_rate,
             tool_leaves_cut,
             spindle_acceleration,
@@ -82,7 +82,8 @@ class VirtualLathe:
         )
         self._event_space: Array = np.empty((64, 3))
         self._found: list[Array] = []
-        self._begin(LatheState.fresh(setup, cut or Cut(), initial_state))
+        start = Cut() if cut is None else _checked(cut)
+        self._begin(LatheState.fresh(setup, start, initial_state))
 
     @classmethod
     def continued(cls, state: LatheState) -> VirtualLathe:
@@ -169,8 +170,7 @@ class VirtualLathe:
         Raises:
             ParameterError: If `samples` is negative.
         """
-        if not isinstance(samples, (int, np.integer)) or samples < 0:
-            raise ParameterError('samples', samples, '', 'a whole number of 0 or more')
+        count_of('samples', samples)
         out = np.empty((0 if self.guard else samples, len(SAMPLE_COLUMNS)))
         self._found = []
         rows, status = 0, layout.SURFACE_FULL
@@ -195,7 +195,7 @@ class VirtualLathe:
             ParameterError: If the machine with this cut is too fast for the sample rate; then
                 nothing has changed.
         """
-        if cut != self.cut:
+        if _checked(cut) != self.cut:
             self._state.retune(cut)
             self._prepare()
 
@@ -250,3 +250,10 @@ class VirtualLathe:
             self.setup.seed, out, self._event_space,
         )  # fmt: skip
         return int(done), int(found), int(status)
+
+
+def _checked(cut: Cut) -> Cut:
+    """The cut, if it is one."""
+    if not isinstance(cut, Cut):
+        raise ParameterError('cut', cut, '', 'a Cut')
+    return cut

@@ -16,6 +16,7 @@ from lathe_chatter.integrator.preparation import constants_of
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe_state import LatheState
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Integers
+from lathe_chatter.quantities import count_of
 
 _REGULAR = 1e-10
 """How closely a number of steps must make a turn, in steps."""
@@ -46,9 +47,12 @@ class LatheSweep:
 
     def __init__(self, lathes: Iterable[VirtualLathe]) -> None:
         """See the class."""
-        states = [lathe.snapshot() for lathe in lathes]
-        if not states:
-            raise ParameterError('lathes', 'empty', '', 'at least one lathe')
+        given = list(lathes)
+        wrong = next((lathe for lathe in given if not isinstance(lathe, VirtualLathe)), None)
+        if not given or wrong is not None:
+            value = 'empty' if wrong is None else wrong
+            raise ParameterError('lathes', value, '', 'at least one VirtualLathe, and no others')
+        states = [lathe.snapshot() for lathe in given]
         kinds = [_kind(state) for state in states]
         order = sorted(range(len(states)), key=lambda place: kinds[place])
         self._size = len(states)
@@ -84,13 +88,14 @@ class LatheSweep:
         Raises:
             ParameterError: If an argument is not allowed.
         """
-        if not isinstance(samples, (int, np.integer)) or samples < 0:
-            raise ParameterError('samples', samples, '', 'a whole number of 0 or more')
-        if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
-            raise ParameterError('workers', workers, '', 'a whole number of 1 or more')
-        for name in columns:
-            if name not in SAMPLE_COLUMNS:
-                raise ParameterError('columns', name, '', f'of {", ".join(SAMPLE_COLUMNS)}')
+        count_of('samples', samples)
+        if workers is not None:
+            count_of('workers', workers, least=1)
+        for name in [columns] if isinstance(columns, str) else columns:
+            if isinstance(columns, str) or name not in SAMPLE_COLUMNS:
+                raise ParameterError(
+                    'columns', name, '', f'a list of some of {", ".join(SAMPLE_COLUMNS)}'
+                )
         wanted = np.array([SAMPLE_COLUMNS.index(name) for name in columns], dtype=np.int64)
         # A column of neighbouring lathes is written at once; the caller sees it lathe by lathe.
         out = np.empty((samples, len(wanted), self._size))
@@ -110,7 +115,12 @@ class LatheSweep:
 
 
 def sample_rate_for(cut: Cut, samples_per_turn: int) -> float:
-    """The sample rate, Hz, at which a turn of this cut is a whole number of samples."""
+    """The sample rate, Hz, at which a turn of this cut is a whole number of samples.
+
+    Raises:
+        ParameterError: If the number is not whole, or below 1.
+    """
+    count_of('samples_per_turn', samples_per_turn, least=1)
     return samples_per_turn * cut.spindle_speed_rpm / 60.0
 
 

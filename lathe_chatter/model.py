@@ -97,6 +97,9 @@ class Machine:
 
     def __post_init__(self) -> None:
         """Validate, with the paper's bearing stiffness where none is given."""
+        for name in ('tool', 'workpiece'):
+            if not isinstance(getattr(self, name), Mode):
+                raise ParameterError(name, getattr(self, name), '', 'a Mode')
         if self.bearing_stiffness is None:
             object.__setattr__(self, 'bearing_stiffness', 0.5 * self.workpiece.stiffness)
         check_fields(self)

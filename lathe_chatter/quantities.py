@@ -7,6 +7,7 @@ all made from these.
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import MISSING, Field, dataclass, field, fields
 from enum import Enum
 from typing import Any
@@ -119,3 +120,18 @@ def check_choice(name: str, value: object, choices: type[Enum]) -> Any:
     except ValueError:
         allowed = ', '.join(str(choice.value) for choice in choices)
         raise ParameterError(name, value, '', f'one of {allowed}') from None
+
+
+def count_of(name: str, value: object, *, least: int = 0) -> int:
+    """A whole number of things.
+
+    Raises:
+        ParameterError: If it is no whole number, or below `least`.
+    """
+    try:
+        count = -1 if isinstance(value, bool) else operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        count = -1
+    if count < least:
+        raise ParameterError(name, value, '', f'a whole number of {least} or more')
+    return count

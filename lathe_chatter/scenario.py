@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.model import Cut
 from lathe_chatter.quantities import Quantity
 
 RECOMMENDED = 'recommended'
@@ -109,7 +111,7 @@ def find_scenario(name_or_path: str) -> Path:
 def load_scenario(path: Path) -> Scenario:
     """Read and check a scenario file.
 
-    Parameter values are checked by the lathe that gets them, which knows their limits.
+    Changes are checked here, parameters of the start by the lathe that gets them.
 
     Raises:
         ScenarioError: If the file is no scenario.
@@ -132,14 +134,38 @@ def load_scenario(path: Path) -> Scenario:
     if wrong is not None:
         raise ScenarioError(f'{where}: expect.{wrong} must be true or false.')
     name = str(raw.get('name', path.stem))
-    return Scenario(
+    duration = _time(raw, 'duration', where, required=True)
+    if not duration:
+        raise ScenarioError(f'{where}: duration is 0 s: it must be more.')
+    scenario = Scenario(
         name=name,
         title=str(raw.get('title', name)),
-        duration=_time(raw, 'duration', where, required=True) or 0.0,
+        duration=duration,
         parameters=_mapping(raw, 'parameters', where),
         steps=tuple(_step(entry, f'{where}: step {k + 1}') for k, entry in enumerate(steps)),
         expect=expect,
     )
+    _check_times(scenario, where)
+    return scenario
+
+
+def _check_times(scenario: Scenario, where: str) -> None:
+    """Refuse a step whose time comes before that of the one before it, or never."""
+    before = 0.0
+    for number, step in enumerate(scenario.steps, 1):
+        if step.at is None:
+            continue
+        if step.at < before:
+            raise ScenarioError(
+                f'{where}: step {number} is at {step.at:g} s, and one before it at {before:g} s: '
+                'steps must be in order of time.'
+            )
+        if step.at > scenario.duration:
+            raise ScenarioError(
+                f'{where}: step {number} is at {step.at:g} s, and the run ends at '
+                f'{scenario.duration:g} s.'
+            )
+        before = step.at
 
 
 def _step(entry: Any, where: str) -> Step:
@@ -155,6 +181,8 @@ def _step(entry: Any, where: str) -> Step:
     changes = _mapping(entry, 'set', where)
     if not changes:
         raise ScenarioError(f'{where}: set must name at least one parameter.')
+    for name, value in changes.items():
+        _check_change(name, value, where)
     return Step(
         changes=changes,
         at=_time(entry, 'at', where),
@@ -162,6 +190,21 @@ def _step(entry: Any, where: str) -> Step:
         after=_time(entry, 'after', where) or 0.0,
         because=str(entry.get('because', '')),
     )
+
+
+def _check_change(name: str, value: Any, where: str) -> None:
+    """Refuse what the lathe would refuse when its time comes."""
+    if name == 'real_time_factor' or (name, value) == ('spindle_speed_rpm', RECOMMENDED):
+        return  # known to the node alone, and to the monitor
+    if name not in Cut.__dataclass_fields__:
+        known = ', '.join(Cut.__dataclass_fields__)
+        near = get_close_matches(name, Cut.__dataclass_fields__, n=1)
+        hint = f'did you mean {near[0]}?' if near else f'what can change is {known}.'
+        raise ScenarioError(f'{where}: {name!r} cannot change while the lathe cuts: {hint}')
+    try:
+        Cut(**{name: value})
+    except ParameterError as error:
+        raise ScenarioError(f'{where}: {error}') from None
 
 
 def _only(raw: Mapping[str, Any], known: set[str], where: str) -> None:

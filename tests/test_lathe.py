@@ -327,3 +327,19 @@ def test_a_wrong_knock_is_refused_and_does_nothing(impulse: Any) -> None:
 def test_a_wrong_number_of_samples_is_refused(samples: Any) -> None:
     with pytest.raises(ParameterError, match=r'^samples is .*: it must be a whole number'):
         VirtualLathe().advance(samples)
+
+
+@pytest.mark.parametrize(
+    ('call', 'words'),
+    [
+        (lambda: Machine(tool=5), 'tool is 5: it must be a Mode'),  # type: ignore[arg-type]
+        (lambda: VirtualLathe(machine=3), 'machine is 3: it must be a Machine'),  # type: ignore[arg-type]
+        (lambda: VirtualLathe(cut={}), 'it must be a Cut'),  # type: ignore[arg-type]
+        (lambda: VirtualLathe().retune(None), 'cut is None: it must be a Cut'),  # type: ignore[arg-type]
+        (lambda: VirtualLathe().advance(samples=True), 'samples is True'),
+        (lambda: VirtualLathe().advance(2.0), 'samples is 2.0'),  # type: ignore[arg-type]
+    ],
+)
+def test_what_is_of_another_kind_is_refused(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        call()

@@ -144,7 +144,11 @@ def test_many_events_and_a_growing_surface() -> None:
 @pytest.mark.parametrize(
     ('call', 'words'),
     [
-        (lambda: LatheSweep([]), 'at least one lathe'),
+        (lambda: LatheSweep([]), 'at least one VirtualLathe'),
+        (lambda: LatheSweep([3]), 'lathes is 3'),
+        (lambda: sample_rate_for(Cut(), 0), 'samples_per_turn is 0'),
+        (lambda: sample_rate_for(Cut(), 2.5), 'samples_per_turn'),
+        (lambda: _sweep().advance(1, columns='time'), 'a list of some of time'),
         (lambda: _sweep().advance(-1), 'samples'),
         (lambda: _sweep().advance(1.5), 'samples'),
         (lambda: _sweep().advance(1, columns=['tool_position']), 'tool_displacement'),

@@ -56,7 +56,9 @@ def run(options: Namespace) -> int:
     source: Path = options.run_path
     suffix = '-unrolled' if options.unrolled else f'.{form}'
     path = options.output or source.with_name(f'{source.stem}{suffix}')
-    columns = tuple(options.columns.split(',')) if options.columns else None
+    columns = None
+    if options.columns is not None:
+        columns = tuple(name.strip() for name in options.columns.split(','))
     chosen = Selection(options.topic, columns, options.start, options.end)
     recorded = read_run(source)
     console = Console(stderr=True, highlight=False, soft_wrap=True)

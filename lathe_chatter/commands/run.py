@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from lathe_chatter.cell import Cell
+from lathe_chatter.commands.output import tell_verdict
 from lathe_chatter.commands.report import show_run
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.history import History, read_history
+from lathe_chatter.history import read_history
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.reader import RunReadError
 from lathe_chatter.scenario import (
@@ -38,6 +40,10 @@ EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
 INTERRUPTED = 130
 _START_PATIENCE = 30.0
 """s for the nodes to find each other."""
+_DISCOVERY = 1.5
+"""s in which nodes that are there already become known."""
+_OURS = {'lathe': 1, 'chatter_monitor': 1, 'run_recorder': 1, 'lathe_operator': 1}
+"""How many nodes of each name a run has."""
 _READERS = 3
 """Recorder, monitor and operator: the lathe cuts nothing before it has met them all."""
 _GRACE = 10.0
@@ -84,7 +90,11 @@ def run(options: Namespace) -> int:
     if interrupted:
         console.print('Interrupted: the run above is complete up to that moment.')
         return INTERRUPTED
-    return _verdict(scenario, history, console)
+    said = {
+        FLAGGED: any(flag.chatter for flag in history.flags),
+        CLEARED: bool(history.flags) and not history.flags[-1].chatter,
+    }
+    return tell_verdict(scenario, said, console)
 
 
 def _has_samples(output: Path) -> bool:
@@ -111,9 +121,10 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
             f'ROS 2 is not there ({error}): source an installation, or use `make run`, '
             'which installs what it needs.'
         ) from None
-    for name in scenario.parameter_names:
+    for name, value in scenario.parameters.items():
         if name not in LATHE:
             raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
+        LATHE[name].check(value)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     operator = Operator(scenario, tell=console.print)
     executor = SingleThreadedExecutor()
@@ -123,6 +134,7 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
         with Cell() as cell:
             try:
                 with console.status('Starting the monitor and the recorder ...'):
+                    _look_around(operator, executor)
                     cell.start(
                         'run_recorder',
                         'lathe_chatter.nodes.recorder_node',
@@ -137,6 +149,7 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
                     'lathe_chatter.nodes.lathe_node',
                     parameter_arguments({'await_readers': _READERS, **scenario.parameters}),
                 )
+                operator.playing = True
                 _follow(operator, executor, cell, scenario, console)
             except KeyboardInterrupt:
                 interrupted = True
@@ -150,6 +163,30 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
     return interrupted
 
 
+def _look_around(operator: Operator, executor: Any) -> None:
+    """See for a while whether the domain is free, before anything is started in it."""
+    until = time.monotonic() + _DISCOVERY
+    while time.monotonic() < until:
+        executor.spin_once(timeout_sec=0.1)
+        _refuse_company(operator, {'lathe_operator': 1})
+
+
+def _refuse_company(operator: Operator, ours: Mapping[str, int] = _OURS) -> None:
+    """See that the domain has no nodes of our names but ours.
+
+    Raises:
+        RunFailedError: If it has: they would be taken for each other.
+    """
+    places = operator.get_node_names_and_namespaces()
+    names = [name for name, namespace in places if namespace == operator.get_namespace()]
+    other = next((name for name in _OURS if names.count(name) > ours.get(name, 0)), None)
+    if other is not None:
+        raise RunFailedError(
+            f'Another {other} is in this ROS domain already: end it, or set ROS_DOMAIN_ID to '
+            'another number.'
+        )
+
+
 def _await_nodes(operator: Operator, executor: Any, cell: Cell) -> None:
     """Wait until the recorder and the monitor are there, so that nothing of the lathe is lost."""
     until = time.monotonic() + _START_PATIENCE
@@ -157,14 +194,11 @@ def _await_nodes(operator: Operator, executor: Any, cell: Cell) -> None:
     while not wanted <= set(operator.get_node_names()):
         executor.spin_once(timeout_sec=0.1)
         cell.check()
+        _refuse_company(operator)
         if time.monotonic() > until:
             missing = ' and '.join(sorted(wanted - set(operator.get_node_names())))
             raise RunFailedError(f'{missing} did not appear within {_START_PATIENCE:.0f} s.')
-    if 'lathe' in operator.get_node_names():
-        raise RunFailedError(
-            'Another lathe is cutting in this ROS domain already: end it, or set ROS_DOMAIN_ID '
-            'to another number.'
-        )
+    _refuse_company(operator, {**_OURS, 'lathe': 0})
 
 
 def _follow(
@@ -183,6 +217,7 @@ def _follow(
         while not _finished(operator, scenario):
             executor.spin_once(timeout_sec=0.1)
             cell.check()
+            _refuse_company(operator)
             if operator.failure is not None:
                 raise operator.failure
             if operator.time == 0.0 and time.monotonic() > until:
@@ -204,20 +239,3 @@ def _finished(operator: Operator, scenario: Scenario) -> bool:
         expected and word not in operator.said for word, expected in scenario.expect.items()
     )
     return not pending or operator.time >= scenario.duration + _GRACE
-
-
-def _verdict(scenario: Scenario, history: History, console: Console) -> int:
-    """Say whether the monitor said what the scenario expects."""
-    said = {
-        FLAGGED: any(flag.chatter for flag in history.flags),
-        CLEARED: bool(history.flags) and not history.flags[-1].chatter,
-    }
-    wrong = [word for word, expected in scenario.expect.items() if said[word] != expected]
-    for word in wrong:
-        expected = 'was' if scenario.expect[word] else 'was not'
-        console.print(f'[bold red]Chatter {expected} to be {word}, and it is otherwise.[/]')
-    if scenario.expect and not wrong:
-        happened = ' and '.join(word for word in (FLAGGED, CLEARED) if scenario.expect.get(word))
-        story = f'chatter was {happened}' if happened else 'nothing was flagged'
-        console.print(f'As the scenario expects, {story}.')
-    return 1 if wrong else 0

@@ -12,13 +12,20 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from lathe_chatter.changes import Knock
-from lathe_chatter.commands.output import print_json
+from lathe_chatter.commands.output import print_json, tell_verdict
 from lathe_chatter.commands.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.commands.report import show_run
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.history import read_history
 from lathe_chatter.quantities import Quantity
-from lathe_chatter.scenario import Scenario, find_scenario, load_scenario, shipped_scenarios
+from lathe_chatter.scenario import (
+    CLEARED,
+    FLAGGED,
+    Scenario,
+    find_scenario,
+    load_scenario,
+    shipped_scenarios,
+)
 from lathe_chatter.simulation import Simulated, needs_monitor, simulate
 from lathe_chatter.warm_up import warm_up
 
@@ -91,9 +98,9 @@ def run(options: Namespace) -> int:
         console.print(f'run      {escape(str(done.folder))}', soft_wrap=True)
     if options.json:
         print_json(figures)
-    expected = scenario.expect
-    as_expected = all(getattr(done, word) == wanted for word, wanted in expected.items())
-    return 0 if as_expected and not done.guard else 1
+    said = {FLAGGED: done.flagged, CLEARED: done.cleared}
+    wrong = tell_verdict(scenario, said, console)
+    return 1 if done.guard else wrong
 
 
 def _scenario(options: Namespace) -> Scenario:

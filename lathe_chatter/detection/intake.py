@@ -96,7 +96,13 @@ class Intake:
             if math.isnan(self._step):
                 if len(rows) < _TO_MEASURE:
                     break
-                yield from self._measure(rows)
+                rate = self._measure(rows)
+                if rate is None:  # too short a stretch to know anything by
+                    whole = _unbroken(rows[:_TO_MEASURE], self._last, self._step, self._dead)
+                    restarted, rows = self._leave_behind(rows, min(whole, _TO_MEASURE - 1))
+                    yield Break.RESTART if restarted else Break.GAP
+                    continue
+                yield rate
             whole = _unbroken(rows, self._last, self._step, self._dead)
             broken = whole < len(rows)
             taken = whole - whole % self.hop
@@ -111,11 +117,12 @@ class Intake:
             yield Break.RESTART if restarted else Break.GAP
         self._held, self._count = [rows], len(rows)
 
-    def _measure(self, rows: Array) -> Iterator[Rate]:
-        """Sample rate and channels of a stretch."""
+    def _measure(self, rows: Array) -> Rate | None:
+        """Sample rate and channels of a stretch; None where it is broken before they are known."""
         first = rows[:_TO_MEASURE]
         steps = np.diff(first[:, 0])
-        self._step = float(np.median(steps[np.isfinite(steps)])) if len(steps) else math.nan
+        steps = steps[np.isfinite(steps)]
+        self._step = float(np.median(steps)) if len(steps) else math.nan
         self._dead = np.asarray(~np.isfinite(first).any(axis=0))
         if self._dead[2] and not self._dead[3]:
             # The workpiece's sensor alone stands for the tool's.
@@ -126,9 +133,10 @@ class Intake:
         if not usable:
             self._step = self._step if self._step > 0.0 else 1.0
             self._dead[2] = False
-            return
-        if _unbroken(first, self._last, self._step, self._dead) == _TO_MEASURE:
-            yield Rate(1.0 / self._step, not self._dead[1], not self._dead[3])
+            return None
+        if _unbroken(first, self._last, self._step, self._dead) < _TO_MEASURE:
+            return None
+        return Rate(1.0 / self._step, not self._dead[1], not self._dead[3])
 
     def _leave_behind(self, rows: Array, at: int) -> tuple[bool, Array]:
         """Drop what is held up to the break; a stretch begins with the next sample."""

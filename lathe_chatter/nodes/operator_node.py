@@ -42,6 +42,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         state: The monitor's word for the cut.
         said: What the monitor has said so far: FLAGGED and CLEARED.
         failure: Why the scenario cannot go on, or None.
+        playing: Whether samples are those of the lathe to play on; nothing is done before.
     """
 
     def __init__(self, scenario: Scenario, tell: Callable[[str], None], **options: Any) -> None:
@@ -51,6 +52,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         self.state = 'waiting'
         self.said: list[str] = []
         self.failure: ScenarioFailedError | None = None
+        self.playing = False
         self._tell = tell
         self._steps = list(scenario.steps)
         self._heard_before_step = 0
@@ -76,6 +78,8 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
     # -- listening -------------------------------------------------------------------------
 
     def _on_samples(self, message: Float64MultiArray) -> None:
+        if not self.playing:
+            return
         samples, columns = samples_from_message(message)
         self.time = float(samples[-1, columns.index('time')])
         if self._steps and not self._in_flight and self._is_due(self._steps[0]):

@@ -69,7 +69,7 @@ class RecorderNode(ParameterNode):
         self._writer: RunWriter | None = None
         self._topics: dict[str, RecordedTopic] = {}
         self._refused: set[str] = set()
-        self._failure = ''
+        self._failure, self._runs = '', 0
         self._journal, self._stalls = Journal(), Stalls()
         self._diagnostics = Diagnostics(self, 'run recorder')
         self.create_service(Trigger, '~/start', self._on_start)
@@ -112,6 +112,8 @@ class RecorderNode(ParameterNode):
         values: Any = self.values
         now = f'{datetime.now().astimezone():%Y%m%d-%H%M%S}'
         folder = Path(values['output'] or Path('runs', now))
+        if self._runs:  # the second of this node stands beside its first
+            folder = folder.with_name(f'{folder.name}-{self._runs + 1}')
         try:
             self._writer = RunWriter(
                 folder,
@@ -121,6 +123,7 @@ class RecorderNode(ParameterNode):
         except OSError as error:
             raise LatheChatterError(f'The run {folder} cannot be made: {error}.') from None
         self._failure = ''
+        self._runs += 1
         self._topics.clear()
         self._refused.clear()
         self._journal, self._stalls = Journal(), Stalls()

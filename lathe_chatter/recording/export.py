@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Array
 from lathe_chatter.recording.frames import UNITS, optional
 from lathe_chatter.recording.reader import Run, RunReadError
@@ -81,7 +82,7 @@ def to_csv(
         OSError: If the file cannot be written.
     """
     parts = _Parts(run, chosen or Selection(), progress)
-    with _new(path).open('w', encoding='ascii', newline='') as stream:
+    with _whole(path), path.open('w', encoding='ascii', newline='') as stream:
         stream.write(','.join(parts.names) + '\n')
         for part in parts:
             stream.writelines(','.join(map(repr, row)) + '\n' for row in part.tolist())
@@ -108,10 +109,8 @@ def to_parquet(
             for n in parts.names
         ]
     )
-    writer = parquet.ParquetWriter(
-        _new(path), schema, compression='zstd', use_dictionary=False, use_byte_stream_split=True
-    )
-    with writer:
+    form = {'compression': 'zstd', 'use_dictionary': False, 'use_byte_stream_split': True}
+    with _whole(path), parquet.ParquetWriter(path, schema, **form) as writer:
         for part in parts:
             arrays = [np.ascontiguousarray(column) for column in part.T]
             writer.write_table(arrow.table(arrays, schema=schema))
@@ -170,11 +169,14 @@ class _Parts:
     """
 
     def __init__(self, run: Run, chosen: Selection, progress: Progress | None) -> None:
+        if not chosen.start <= chosen.end:
+            raise ParameterError('start', chosen.start, 's', f'at most the end, {chosen.end:g} s')
         self._run, self._chosen, self._progress = run, chosen, progress
         self.count, self.seams = 0, Seams()
         first = next(iter(run.sample_blocks(chosen.topic)), None)
         if first is None:
-            raise RunReadError(f'{run.path} holds no samples.')
+            topic = chosen.topic or run.samples_topic()
+            raise RunReadError(f'{run.path} holds no samples of the topic {topic}.')
         wanted = first.columns if chosen.columns is None else (_TIME, *chosen.columns)
         missing = sorted(set(wanted) - set(first.columns))
         if missing:
@@ -196,12 +198,21 @@ class _Parts:
                 yield part
             if self._progress is not None:
                 self._progress(len(blocks.samples))
+        if self.count == 0:
+            start, end = at(self._chosen.start), at(self._chosen.end)
+            raise RunReadError(f'{self._run.path} holds no samples from {start} to {end}.')
 
 
-def _new(path: Path) -> Path:
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """A new file that is there whole or not at all."""
     if path.exists():
         raise ExportExistsError(path)
-    return path
+    try:
+        yield
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def seam_sentences(exported: Exported) -> Iterable[str]:

@@ -194,5 +194,35 @@ def test_a_misspelt_parameter_is_refused_before_anything_starts(
         timeout=120,
     )
     assert done.returncode == 2
-    assert "'depth_of_cuts': did you mean depth_of_cut?" in done.stderr
+    assert (
+        "'depth_of_cuts' cannot change while the lathe cuts: did you mean depth_of_cut?"
+        in done.stderr
+    )
     assert not (tmp_path / 'run').exists()
+
+
+def test_a_lathe_that_is_there_already_is_left_alone(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    """Its names would be taken for the run's own: the run is refused, and nothing is changed."""
+    scenario = tmp_path / 'short.yaml'
+    scenario.write_text(SHORT)
+    node = [sys.executable, '-m', 'lathe_chatter.nodes.lathe_node']
+    node += ['--ros-args', '-p', 'await_readers:=1']
+    with subprocess.Popen(node, env=environment, stderr=subprocess.PIPE, text=True) as foreign:
+        assert foreign.stderr is not None
+        while 'Waiting for' not in (line := foreign.stderr.readline()):
+            assert line, 'the lathe ended'
+        done = subprocess.run(
+            command('--scenario', str(scenario), '--output', str(tmp_path / 'run')),
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+        )
+        foreign.send_signal(signal.SIGINT)
+        said = foreign.stderr.read()
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert 'Another lathe is in this ROS domain already' in done.stderr
+    assert 'depth_of_cut' not in said

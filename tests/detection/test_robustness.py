@@ -224,6 +224,28 @@ def test_a_sample_that_is_no_number_counts_as_lost() -> None:
     assert seen[-1].state == 'stable'
 
 
+@pytest.mark.parametrize('before', [1, 20, 32, 33])
+def test_a_gap_after_the_first_few_samples_is_survived(before: int) -> None:
+    """A stretch too short to know its sample rate by is forgotten."""
+    lathe, detector = VirtualLathe(cut=_cut()), ChatterDetector()
+    detector.update(lathe.advance(before), SAMPLE_COLUMNS)
+    lathe.advance(20)
+    assert _watch(detector, _seconds(lathe, 3.0))[-1].state == 'stable'
+
+
+def test_two_lathes_on_one_topic_are_no_exception() -> None:
+    """Blocks of both come in turn, some backwards, some without numbers."""
+    rng = np.random.default_rng(0)
+    lathes, detector = [VirtualLathe(cut=_cut(1e-3)) for _ in range(2)], ChatterDetector()
+    for _ in range(400):
+        samples = lathes[rng.integers(0, 2)].advance(int(rng.integers(0, 200)))
+        if rng.random() < 0.1:
+            samples = samples[::-1].copy()
+        if rng.random() < 0.05:
+            samples[:] = np.nan
+        detector.update(samples, SAMPLE_COLUMNS)
+
+
 def _without(*dropped: str) -> tuple[list[int], tuple[str, ...]]:
     kept = [place for place, name in enumerate(SAMPLE_COLUMNS) if name not in dropped]
     return kept, tuple(SAMPLE_COLUMNS[place] for place in kept)

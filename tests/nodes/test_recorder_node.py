@@ -71,8 +71,8 @@ def test_the_services_start_split_and_stop(
     assert len(run.files) == 2
     assert [m.message.data for m in run.messages('/n')] == [float(k) for k in range(20)]
     answer = bench.call(Trigger, '/run_recorder/start', Trigger.Request())
-    assert not answer.success
-    assert 'exists already' in answer.message
+    assert answer.success, answer.message
+    assert recorder.run == tmp_path / 'run-2'
 
 
 def test_a_loss_on_the_way_is_counted(

@@ -106,6 +106,27 @@ def test_a_column_that_is_not_there_is_one_sentence(
     assert 'have no column speed.' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (('--start', '5', '--end', '3'), 'at most the end, 3 s'),
+        (('--start', 'nan'), 'start is nan s'),
+        (('--start', '1e6'), 'holds no samples from 1000000'),
+        (('--topic', '/x/samples'), 'no samples of the topic /x/samples'),
+        (('--columns', ''), 'no column'),
+    ],
+)
+def test_a_choice_of_nothing_is_one_sentence_and_leaves_no_file(
+    folder: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], words: str
+) -> None:
+    before = sorted(folder.parent.iterdir())
+    assert main(['export', str(folder), *options]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert 'Traceback' not in said
+    assert sorted(folder.parent.iterdir()) == before
+
+
 def test_parquet_holds_every_bit_units_and_gaps(
     folder: Path, samples: Array, tmp_path: Path
 ) -> None:
