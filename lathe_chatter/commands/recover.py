@@ -38,7 +38,7 @@ def run(options: Namespace) -> int:
     except OSError as error:
         raise RecoverFailedError(f'{output} cannot be written: {error}.') from None
     console = Console(highlight=False, soft_wrap=True)
-    damage = [str(each) for each in saved.damage]
+    damage = [*map(str, saved.damage), *saved.lost]
     if options.json:
         figures = {'run': str(output), 'messages': dict(saved.messages), 'damage': damage}
         console.print(json.dumps(figures), markup=False)

@@ -10,11 +10,12 @@ from typing import Any
 
 from lathe_chatter.recording.identity import IDENTITY, RECOVERED
 from lathe_chatter.recording.metadata import FILE_NAME
+from lathe_chatter.recording.reader import Run
 from lathe_chatter.recording.recorded_file import Note, RecordedFile
 from lathe_chatter.recording.run_files import CLOSED
 from lathe_chatter.recording.summary import body_is_sound, read_summary
 from lathe_chatter.recording.tally import FILE_NAME as UNFINISHED
-from lathe_chatter.recording.tally import Taken, taken
+from lathe_chatter.recording.tally import taken
 from lathe_chatter.recording.verification import Verification
 
 
@@ -38,43 +39,57 @@ def check_files(found: Verification) -> None:
 
 def check_end(found: Verification, notes: list[Note]) -> None:
     """That the recorder finished, and all its files are there."""
-    counts = taken(found.run.path) if found.run.folder else {}
-    ours = (found.run.path / UNFINISHED).exists() or any(n.name == IDENTITY for n in notes)
-    ends = [note.values for note in notes if note.name == CLOSED]
-    if ours and (not ends or len(ends) < len(found.run.files) or ends[-1].get('next')):
+    end = max((count.last for count in found.samples.values()), default=math.nan)
+    for text in lost_at_the_end(found.run, found.messages, found.last, end):
         found.finished = False
-        _say_what_is_lost(found, counts)
+        found.lose(text)
     for note in notes:
         if note.name == RECOVERED:
-            found.lose(f'This run was recovered from {note.values.get("from", "another")}.')
-            for text in noted(note, 'damage') or ():
+            lost = noted(note, 'damage') or ()
+            said = f'This run was recovered from {note.values.get("from", "another")}.'
+            (found.lose if lost else found.remark)(said)
+            for text in lost:
                 found.lose(f'Before the recovery: {text}')
 
 
-def _say_what_is_lost(found: Verification, counts: Mapping[int, Taken]) -> None:
-    """What a recorder that did not finish had taken, and is not there."""
+def lost_at_the_end(
+    run: Run, messages: Mapping[str, int], last: Mapping[str, int], end: float = math.nan
+) -> list[str]:
+    """What a recorder that did not finish had taken, and is not there, as sentences.
+
+    Args:
+        run: Of the recorder.
+        messages: That are there, by name of topic.
+        last: When the last of them was received, ns since the epoch.
+        end: Simulated time of the last sample that is there, s.
+
+    Returns:
+        None at all where the recorder did finish.
+    """
+    counts = taken(run.path) if run.folder else {}
+    notes = run.notes()
+    ours = (run.path / UNFINISHED).exists() or any(note.name == IDENTITY for note in notes)
+    ends = [note.values for note in notes if note.name == CLOSED]
+    if not ours or (len(ends) >= len(run.files) and not ends[-1].get('next')):
+        return []
     names: dict[int, str] = {}
-    for path in found.run.files:
+    for path in run.files:
         known = RecordedFile(path, lambda _damage: None).known
         names |= {number: channel.topic for number, channel in known.channels.items()}
-    before = len(found.findings)
-    for channel, (messages, last) in sorted(counts.items()):
+    found: list[str] = []
+    for channel, (count, when) in sorted(counts.items()):
         name = names.get(channel, '')
-        lost = messages - found.messages[name]
-        if lost <= 0:
-            continue
-        if name in found.last:
-            span = f'the last {(last - found.last[name]) / 1e9:.3f} s'
-            found.lose(f'{name}: {lost} messages that had come are not there, {span}.')
-        else:
+        lost = count - messages.get(name, 0)
+        if lost > 0 and name in last:
+            span = f'the last {(when - last[name]) / 1e9:.3f} s'
+            found.append(f'{name}: {lost} messages that had come are not there, {span}.')
+        elif lost > 0:
             named = name or 'a topic that is not there either'
-            found.lose(f'{named}: none of the {lost} messages that had come are there.')
-    what = 'what came at the end is not there'
-    if counts and len(found.findings) == before:
-        what = 'all that it had taken is there'
-    end = max((count.last for count in found.samples.values()), default=math.nan)
+            found.append(f'{named}: none of the {lost} messages that had come are there.')
+    missing = found or not counts
+    what = 'what came at the end is not there' if missing else 'all that it had taken is there'
     where = '' if math.isnan(end) else f', the last sample is of {end:.6f} s'
-    found.lose(f'The recorder did not finish: {what}{where}.')
+    return [*found, f'The recorder did not finish: {what}{where}.']
 
 
 def check_order(found: Verification) -> None:

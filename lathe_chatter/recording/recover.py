@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
+from lathe_chatter.recording.completeness import lost_at_the_end
 from lathe_chatter.recording.identity import RECOVERED
 from lathe_chatter.recording.reader import Run, raw_of, read_run
 from lathe_chatter.recording.recorded_file import RecordedFile, offers_of
@@ -25,11 +26,13 @@ class Recovery(NamedTuple):
         run: The new one.
         messages: Saved, by name of topic.
         damage: What could not be read of the old one.
+        lost: What its recorder had taken and is in no file, as sentences.
     """
 
     run: Run
     messages: Counter[str]
     damage: list[Damage]
+    lost: list[str]
 
 
 def recover(path: Path | str, output: Path) -> Recovery:
@@ -46,19 +49,23 @@ def recover(path: Path | str, output: Path) -> Recovery:
     """
     old = read_run(path, damaged=True)
     saved: Counter[str] = Counter()
+    last: dict[str, int] = {}
     damage: list[Damage] = [*old.damage]
     with RunWriter(output) as writer:
         for place, file in enumerate(old.files):
             if place:
                 writer.split()
-            _copy(RecordedFile(file, damage.append), writer, saved)
-        said = json.dumps([str(each) for each in damage])
+            _copy(RecordedFile(file, damage.append), writer, saved, last)
+        lost = lost_at_the_end(old, saved, last)
+        said = json.dumps([*map(str, damage), *lost])
         writer.note(RECOVERED, {'from': str(old.path), 'damage': said})
-    return Recovery(read_run(output), saved, damage)
+    return Recovery(read_run(output), saved, damage, lost)
 
 
-def _copy(file: RecordedFile, writer: RunWriter, saved: Counter[str]) -> None:
-    """Copy what one file holds."""
+def _copy(
+    file: RecordedFile, writer: RunWriter, saved: Counter[str], last: dict[str, int]
+) -> None:
+    """Copy what one file holds, counting messages and noting when the last was received."""
     for note in file.notes():
         if note.name not in _NOT_COPIED:
             writer.note(note.name, note.values)
@@ -75,6 +82,7 @@ def _copy(file: RecordedFile, writer: RunWriter, saved: Counter[str]) -> None:
                 sequence=raw.sequence,
             )
             saved[raw.topic] += 1
+            last[raw.topic] = max(raw.log_time, last.get(raw.topic, 0))
         writer.commit()
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from recording.conftest import number, topic
 
-from lathe_chatter.recording import RunWriter, verify
+from lathe_chatter.recording import RunWriter, recover, verify
 from lathe_chatter.recording.tally import FILE_NAME, Tally, taken
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -58,6 +58,21 @@ def test_a_kill_costs_what_verify_says(tmp_path: Path) -> None:
         'a topic that is not there either: none of the 1 messages that had come are there.',
         'The recorder did not finish: what came at the end is not there.',
     ]
+    saved = recover(run, tmp_path / 'saved')
+    assert saved.damage == []
+    assert saved.lost == [finding.text for finding in found.findings]
+    again = [finding.text for finding in verify(tmp_path / 'saved').findings]
+    assert again[1:] == [f'Before the recovery: {text}' for text in saved.lost]
+
+
+def test_what_is_recovered_of_a_whole_run_is_whole(tmp_path: Path) -> None:
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.note('lathe_chatter/made_by', {'lathe_chatter': '0'})
+        writer.add_topic(topic('/n'))
+        writer.write('/n', number(1), log_time=7, publish_time=7, sequence=1)
+    saved = recover(tmp_path / 'run', tmp_path / 'saved')
+    assert saved.damage == saved.lost == []
+    assert verify(tmp_path / 'saved').complete
 
 
 def test_a_run_that_was_finished_has_no_counts(tmp_path: Path) -> None:
