@@ -75,13 +75,14 @@ class Seams:
         if not len(steps):
             return
         if self.step == 0.0:
-            usual = float(np.median(steps))
-            self.step = usual if 0.0 < usual < np.inf else 0.0
+            told = steps[np.isfinite(steps)]
+            self.step = max(float(np.median(told)), 0.0) if len(told) else 0.0
         if steps.min() > 0.0 and steps.max() <= _LARGER_THAN_STEP * self.step:
             return
         # So that a time which is no number is a seam too.
         forward = steps > 0.0
-        for place in np.flatnonzero(~(forward & (steps <= _LARGER_THAN_STEP * self.step))):
+        longest = _LARGER_THAN_STEP * self.step if self.step else np.inf
+        for place in np.flatnonzero(~(forward & (steps <= longest))):
             seam = float(joined[place]), float(joined[place + 1])
             if not forward[place]:
                 self.restarts.append(seam)

@@ -102,7 +102,9 @@ def test_payloads_that_cannot_be_are_losses_and_no_traceback(
     alter: Alter, said: str, blocks: list[Array], tmp_path: Path
 ) -> None:
     file = write(tmp_path / 'odd_0.mcap', blocks, alter)
-    assert any(said in finding.text for finding in verify(file).findings if finding.loss)
+    found = verify(file).findings
+    assert any(said in finding.text for finding in found if finding.loss)
+    assert len(found) < 5
     assert main(['verify', str(file), '--resimulate']) == 1
     assert main(['export', str(file), '--output', str(tmp_path / 'odd.csv')]) in {0, 2}
     assert main(['recover', str(file), '--output', str(tmp_path / 'saved')]) == 0
