@@ -19,7 +19,7 @@ from lathe_chatter.changes import Change, Knock
 from lathe_chatter.lathe_parameters import cut_from, machine_from
 from lathe_chatter.model import Array, Cut, Machine
 from lathe_chatter.recording import Run, read_run
-from lathe_chatter.recording.reader import Samples
+from lathe_chatter.recording.reading.reader import Samples
 from lathe_chatter.recording.told import told_by
 
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')

@@ -19,7 +19,7 @@ from lathe_chatter.commands.report import show_run
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.history import read_history
 from lathe_chatter.recording import read_run
-from lathe_chatter.recording.reader import RunReadError
+from lathe_chatter.recording.reading.reader import RunReadError
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,

@@ -10,13 +10,13 @@ from typing import Any
 
 from lathe_chatter.recording.identity import IDENTITY, RECOVERED
 from lathe_chatter.recording.metadata import FILE_NAME
-from lathe_chatter.recording.reader import Run
-from lathe_chatter.recording.recorded_file import Note, RecordedFile
-from lathe_chatter.recording.run_files import CLOSED
-from lathe_chatter.recording.summary import body_is_sound, read_summary
-from lathe_chatter.recording.tally import FILE_NAME as UNFINISHED
-from lathe_chatter.recording.tally import taken
+from lathe_chatter.recording.reading.reader import Run
+from lathe_chatter.recording.reading.recorded_file import Note, RecordedFile
+from lathe_chatter.recording.reading.summary import body_is_sound, read_summary
 from lathe_chatter.recording.verification import Verification
+from lathe_chatter.recording.writing.run_files import CLOSED
+from lathe_chatter.recording.writing.tally import FILE_NAME as UNFINISHED
+from lathe_chatter.recording.writing.tally import taken
 
 
 def check_files(found: Verification) -> None:

@@ -16,9 +16,9 @@ import numpy as np
 from lathe_chatter.changes import Change, parse_change
 from lathe_chatter.continuity import Continuity
 from lathe_chatter.errors import LayoutError
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE, Layout, layout_of
+from lathe_chatter.recording.reading.sample_series import missing_in
 from lathe_chatter.recording.ros_messages import LOG_TYPE, types
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Layout, layout_of
-from lathe_chatter.recording.sample_series import missing_in
 
 FLAG_TYPE = 'std_msgs/msg/Bool'
 _FLAG_BYTE = 4

@@ -12,6 +12,7 @@ from lathe_chatter.model import Array
 from lathe_chatter.recording.closing import SUMMARY, closing_summary
 from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity
 from lathe_chatter.recording.journal import Journal
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
     PARAMETER_EVENT_TYPE,
@@ -21,8 +22,7 @@ from lathe_chatter.recording.ros_messages import (
     samples_bytes,
     topic_of_type,
 )
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
-from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.recording.writing.writer import RunWriter
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""

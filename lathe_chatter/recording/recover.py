@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 from lathe_chatter.recording.completeness import lost_at_the_end
 from lathe_chatter.recording.identity import RECOVERED
-from lathe_chatter.recording.reader import Run, raw_of, read_run
-from lathe_chatter.recording.recorded_file import RecordedFile, offers_of
-from lathe_chatter.recording.run_files import CLOSED
-from lathe_chatter.recording.scan import Damage
-from lathe_chatter.recording.writer import RunWriter, Topic
+from lathe_chatter.recording.reading.reader import Run, raw_of, read_run
+from lathe_chatter.recording.reading.recorded_file import RecordedFile, offers_of
+from lathe_chatter.recording.reading.scan import Damage
+from lathe_chatter.recording.writing.run_files import CLOSED
+from lathe_chatter.recording.writing.writer import RunWriter, Topic
 
 _NOT_COPIED = (CLOSED, 'rosbag2')
 """Notes that a writer makes itself."""

@@ -19,8 +19,8 @@ from lathe_chatter.errors import LatheChatterError, LayoutError, ParameterError
 from lathe_chatter.lathe_parameters import lathe_from
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Integers
 from lathe_chatter.recording.identity import IDENTITY, core_identity
-from lathe_chatter.recording.reader import Run, RunReadError
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks
+from lathe_chatter.recording.reading.reader import Run, RunReadError
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE, Blocks
 from lathe_chatter.recording.told import Told, told_by
 from lathe_chatter.recording.verify import Finding
 

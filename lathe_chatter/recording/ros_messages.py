@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
 
 LOG_TYPE = 'rcl_interfaces/msg/Log'
 PARAMETER_EVENT_TYPE = 'rcl_interfaces/msg/ParameterEvent'

@@ -16,7 +16,7 @@ from lathe_chatter.changes import (
     parse_knock,
 )
 from lathe_chatter.recording.identity import PARAMETERS
-from lathe_chatter.recording.reader import Run
+from lathe_chatter.recording.reading.reader import Run
 
 _KINDS = {1: 'bool_value', 2: 'integer_value', 3: 'double_value', 4: 'string_value'}
 

@@ -19,10 +19,10 @@ from lathe_chatter.recording.completeness import (
 )
 from lathe_chatter.recording.identity import PUBLISHERS, RECEPTION, STALLS
 from lathe_chatter.recording.numbering import Numbering
-from lathe_chatter.recording.reader import Run, read_run
-from lathe_chatter.recording.recorded_file import Note, RecordedFile, offers_of
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
-from lathe_chatter.recording.sample_series import Seams, at, missing_in
+from lathe_chatter.recording.reading.reader import Run, read_run
+from lathe_chatter.recording.reading.recorded_file import Note, RecordedFile, offers_of
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.recording.reading.sample_series import Seams, at, missing_in
 from lathe_chatter.recording.verification import Finding, SampleCount, Verification
 
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']

@@ -14,8 +14,8 @@ from lathe_chatter.lathe_parameters import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
 from lathe_chatter.recording.closing import SUMMARY
 from lathe_chatter.recording.journal import Journal
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
 from lathe_chatter.recording.ros_messages import samples_bytes
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
 
 TICK = 2_000_000
 

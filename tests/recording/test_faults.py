@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from recording.conftest import STORE, number, topic
-from recording.test_reader import ARRAY, block
+from recording.reading.test_reader import ARRAY, block
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from lathe_chatter.lathe import VirtualLathe

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from recording.test_writer import CHILD, values_by_mcap
+from recording.writing.test_writer import CHILD, values_by_mcap
 
 PACKAGES = ('@mcap/core@2.2.2', '@mcap/support@1.1.0')
 SCRIPT = Path(__file__).with_name('read_with_mcap_core.mjs')

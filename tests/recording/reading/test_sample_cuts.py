@@ -10,10 +10,10 @@ from recording.conftest import number, topic
 
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.recording import RunReadError, RunWriter, read_run
-from lathe_chatter.recording.recorded_file import RecordedFile
+from lathe_chatter.recording.reading.recorded_file import RecordedFile
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.recording.reading.sample_cuts import cuts_by_index
 from lathe_chatter.recording.ros_messages import samples_bytes
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE
-from lathe_chatter.recording.sample_cuts import cuts_by_index
 
 BLOCKS, ROWS, PER_COMMIT = 6000, 5, 100
 START = 1_700_000_000_000_000_000

@@ -7,10 +7,10 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from lathe_chatter.recording.recorded_file import RecordedFile
-from lathe_chatter.recording.sample_blocks import Layout, layout_of
-from lathe_chatter.recording.sample_columns import Cut, Cutter, Room, index_size
-from lathe_chatter.recording.scan import Damage
+from lathe_chatter.recording.reading.recorded_file import RecordedFile
+from lathe_chatter.recording.reading.sample_blocks import Layout, layout_of
+from lathe_chatter.recording.reading.sample_columns import Cut, Cutter, Room, index_size
+from lathe_chatter.recording.reading.scan import Damage
 
 _AT_ONCE = 16
 """Chunks in one piece of work: 4 s of a recording, some MB."""

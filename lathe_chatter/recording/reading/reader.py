@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from lathe_chatter.recording.chunk_messages import Messages, joined_messages
-from lathe_chatter.recording.frames import to_pandas, to_xarray
-from lathe_chatter.recording.recorded_file import Contents, Note, RecordedFile
-from lathe_chatter.recording.run_folder import RunFolder, RunReadError, run_folder
-from lathe_chatter.recording.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
-from lathe_chatter.recording.sample_columns import Cut, cut_of
-from lathe_chatter.recording.sample_cuts import cuts_by_index
-from lathe_chatter.recording.sample_series import Samples, joined
-from lathe_chatter.recording.scan import Damage
+from lathe_chatter.recording.reading.chunk_messages import Messages, joined_messages
+from lathe_chatter.recording.reading.frames import to_pandas, to_xarray
+from lathe_chatter.recording.reading.recorded_file import Contents, Note, RecordedFile
+from lathe_chatter.recording.reading.run_folder import RunFolder, RunReadError, run_folder
+from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
+from lathe_chatter.recording.reading.sample_columns import Cut, cut_of
+from lathe_chatter.recording.reading.sample_cuts import cuts_by_index
+from lathe_chatter.recording.reading.sample_series import Samples, joined
+from lathe_chatter.recording.reading.scan import Damage
 
 __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 

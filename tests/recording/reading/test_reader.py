@@ -9,7 +9,7 @@ from recording.conftest import NUMBER, STORE, number, topic
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.recording import RunWriter, read_run
-from lathe_chatter.recording.reader import RunReadError
+from lathe_chatter.recording.reading.reader import RunReadError
 
 ARRAY = 'std_msgs/msg/Float64MultiArray'
 DIMENSION, LAYOUT = 'std_msgs/msg/MultiArrayDimension', 'std_msgs/msg/MultiArrayLayout'

@@ -19,7 +19,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.crc import crc32
-from lathe_chatter.recording.summary import ChunkPlace
+from lathe_chatter.recording.reading.summary import ChunkPlace
 
 _HEAD = struct.Struct('<BQ')
 _CHUNK = struct.Struct('<QQQII')

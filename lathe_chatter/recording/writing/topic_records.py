@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mcap.records import Channel, Schema
 
 from lathe_chatter.recording.metadata import Topic, dump_qos
-from lathe_chatter.recording.open_chunk import record_bytes
+from lathe_chatter.recording.writing.open_chunk import record_bytes
 
 
 class TopicRecords(NamedTuple):

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import Array, Integers
-from lathe_chatter.recording.chunk_messages import HEAD, messages_of
-from lathe_chatter.recording.recorded_file import RecordedFile
-from lathe_chatter.recording.sample_blocks import Blocks, Layout, blocks_of
-from lathe_chatter.recording.scan import Damage, Read, read_chunk
-from lathe_chatter.recording.summary import ChunkPlace
+from lathe_chatter.recording.reading.chunk_messages import HEAD, messages_of
+from lathe_chatter.recording.reading.recorded_file import RecordedFile
+from lathe_chatter.recording.reading.sample_blocks import Blocks, Layout, blocks_of
+from lathe_chatter.recording.reading.scan import Damage, Read, read_chunk
+from lathe_chatter.recording.reading.summary import ChunkPlace
 
 TIME = 'time'
 _FIXED = 11

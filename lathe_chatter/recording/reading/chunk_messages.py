@@ -11,7 +11,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from lathe_chatter.model import Integers
-from lathe_chatter.recording.scan import Chunk
+from lathe_chatter.recording.reading.scan import Chunk
 
 HEAD = np.dtype(
     [

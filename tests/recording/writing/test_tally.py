@@ -11,9 +11,9 @@ import pytest
 from recording.conftest import number, topic
 
 from lathe_chatter.recording import RunWriter, recover, verify
-from lathe_chatter.recording.tally import FILE_NAME, Tally, taken
+from lathe_chatter.recording.writing.tally import FILE_NAME, Tally, taken
 
-TESTS = Path(__file__).resolve().parents[1]
+TESTS = Path(__file__).resolve().parents[2]
 CHILD = """
 import sys
 from pathlib import Path

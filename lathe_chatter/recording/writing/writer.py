@@ -9,12 +9,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
-from lathe_chatter.recording.background import Background
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.open_chunk import OpenChunk
-from lathe_chatter.recording.run_files import CLOSED, DiskFullError, RunExistsError, RunFiles
-from lathe_chatter.recording.tally import Tally
-from lathe_chatter.recording.topic_records import TopicTable
+from lathe_chatter.recording.writing.background import Background
+from lathe_chatter.recording.writing.open_chunk import OpenChunk
+from lathe_chatter.recording.writing.run_files import (
+    CLOSED,
+    DiskFullError,
+    RunExistsError,
+    RunFiles,
+)
+from lathe_chatter.recording.writing.tally import Tally
+from lathe_chatter.recording.writing.topic_records import TopicTable
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import Array, Integers
-from lathe_chatter.recording.chunk_messages import Messages
+from lathe_chatter.recording.reading.chunk_messages import Messages
 
 SAMPLES_TYPE = 'std_msgs/msg/Float64MultiArray'
 _LITTLE_ENDIAN = b'\x00\x01'

@@ -10,8 +10,8 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import SAMPLE_COLUMNS
 
 if TYPE_CHECKING:
-    from lathe_chatter.recording.reader import Run
-    from lathe_chatter.recording.sample_series import Samples
+    from lathe_chatter.recording.reading.reader import Run
+    from lathe_chatter.recording.reading.sample_series import Samples
 
 UNITS: Mapping[str, str] = dict(
     zip(SAMPLE_COLUMNS, ('s', 'rev', 'm', 'm/s', 'm', 'm/s', 'm', 'N'), strict=True)

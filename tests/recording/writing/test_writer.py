@@ -14,7 +14,7 @@ from recording.conftest import BOOL, NUMBER, STORE, number, topic
 from rosbags.rosbag2 import Reader
 
 from lathe_chatter.recording import RunWriter, Topic
-from lathe_chatter.recording.writer import DiskFullError, RunExistsError
+from lathe_chatter.recording.writing.writer import DiskFullError, RunExistsError
 
 START = 1_700_000_000_000_000_000
 
@@ -163,7 +163,7 @@ while True:
 @pytest.mark.parametrize('commits', [1, 3, 20, 100])
 def test_a_killed_writer_leaves_a_file_that_opens(commits: int, tmp_path: Path) -> None:
     folder = tmp_path / 'run'
-    tests = Path(__file__).resolve().parents[1]
+    tests = Path(__file__).resolve().parents[2]
     with subprocess.Popen(
         [sys.executable, '-c', CHILD, str(folder)], stdout=subprocess.PIPE, text=True, cwd=tests
     ) as child:

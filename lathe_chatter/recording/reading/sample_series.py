@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lathe_chatter.model import Array, Integers
-from lathe_chatter.recording.sample_columns import Cut
+from lathe_chatter.recording.reading.sample_columns import Cut
 
 _LARGER_THAN_STEP = 1.5
 """A step of time between two samples so many times the usual one is a gap."""

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.recording.background_sync import BackgroundSync
-from lathe_chatter.recording.committed_file import CommittedFile, Contents
 from lathe_chatter.recording.metadata import FileCount, describe, dump, replace_file
-from lathe_chatter.recording.open_chunk import OpenChunk
-from lathe_chatter.recording.topic_records import TopicRecords
+from lathe_chatter.recording.writing.background_sync import BackgroundSync
+from lathe_chatter.recording.writing.committed_file import CommittedFile, Contents
+from lathe_chatter.recording.writing.open_chunk import OpenChunk
+from lathe_chatter.recording.writing.topic_records import TopicRecords
 
 CLOSED = 'lathe_chatter/closed'
 """Name of the MCAP metadata record that ends each file of a run; a killed recorder leaves none.

@@ -16,9 +16,14 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
-from lathe_chatter.recording.chunk_messages import Messages, messages_of
-from lathe_chatter.recording.scan import Chunk, Damage, Plain, Wanted, scan
-from lathe_chatter.recording.summary import Summary, add_record, body_is_sound, read_summary
+from lathe_chatter.recording.reading.chunk_messages import Messages, messages_of
+from lathe_chatter.recording.reading.scan import Chunk, Damage, Plain, Wanted, scan
+from lathe_chatter.recording.reading.summary import (
+    Summary,
+    add_record,
+    body_is_sound,
+    read_summary,
+)
 
 _RECORD = struct.Struct('<BQ')
 _LOOSE_AT_ONCE = 1 << 20

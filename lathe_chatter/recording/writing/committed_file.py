@@ -35,9 +35,9 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from lathe_chatter.recording.background_sync import BackgroundSync
 from lathe_chatter.recording.crc import crc32
-from lathe_chatter.recording.open_chunk import ClosedChunk, OpenChunk, record_bytes
+from lathe_chatter.recording.writing.background_sync import BackgroundSync
+from lathe_chatter.recording.writing.open_chunk import ClosedChunk, OpenChunk, record_bytes
 
 
 @dataclass

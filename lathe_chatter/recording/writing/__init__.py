@@ -1,0 +1,1 @@
+"""How a run gets to the disk: complete after every commit, whatever happens to its writer."""
