@@ -111,7 +111,9 @@ class Cell:
 
 
 def _last_words(name: str, code: int, output: IO[bytes]) -> str:
-    """What a node said last, as the reason for its end."""
+    """What a node said last, as the reason for its end, unless it was killed."""
+    if code < 0:
+        return f'{name} was ended by the signal {signal.Signals(-code).name}.'
     output.seek(0)
     lines = output.read().decode(errors='replace').split('\n')
     words = next((line.strip() for line in reversed(lines) if line.strip()), 'it said nothing')

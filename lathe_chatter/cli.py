@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import signal
 import sys
 from collections.abc import Sequence
@@ -45,6 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     for wish in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(wish, _interrupt)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors='replace')  # where the terminal lacks a letter
     options = parser().parse_args(arguments)
     try:
         code: int = options.run(options)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -29,7 +30,19 @@ def _cache_folder(package: Path) -> str:
         digest.update(file.read_bytes())
     home = os.environ.get('XDG_CACHE_HOME') or '~/.cache'
     base = Path(numba.config.CACHE_DIR or Path(home).expanduser() / 'lathe_chatter')
-    return str(base / f'{package.name}-{digest.hexdigest()[:16]}')
+    folder = f'{package.name}-{digest.hexdigest()[:16]}'
+    if not _is_writable(base / folder):  # a service without a home: kept until the next boot
+        base = Path(tempfile.gettempdir()) / f'lathe_chatter-{os.getuid()}'
+    return str(base / folder)
+
+
+def _is_writable(folder: Path) -> bool:
+    """Whether files can be made in a folder, which is made where it is not there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
 
 
 @contextmanager

@@ -83,6 +83,8 @@ def run(options: Namespace) -> int:
     if interrupted and not _has_samples(output):
         console.print('Interrupted before anything was recorded.')
         return INTERRUPTED
+    if interrupted:
+        console.print('Interrupted: the run is finished and reported ...')
     history = read_history(output)
     figures = show_run(history, console)
     if options.json:
