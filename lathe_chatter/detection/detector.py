@@ -137,7 +137,8 @@ class ChatterDetector:
         numbers = self._ledger.numbers
         numbers[ledgers.SMALLEST], numbers[ledgers.STRICTNESS] = self._smallest, self._strictness
         spindle = machine.workpiece.stiffness if machine is not None else 0.0
-        self._guess = np.array([complex(0.0, 2.0 * math.pi * band.middle), 0.0, spindle])
+        middle = complex(0.0, 2.0 * math.pi * band.middle)
+        self._guess = np.array([middle, 0.0, spindle, middle])
         self._begin_stretch()
 
     def _begin_stretch(self) -> None:

@@ -28,6 +28,7 @@ from lathe_chatter.detection.ledger import (
     RISE,
     SEEN,
     SINCE_JUMP,
+    STEPPED,
     USUAL,
     USUAL_SEEN,
     Ledger,
@@ -41,6 +42,7 @@ from lathe_chatter.detection.signals import (
     PHASE_SEEN,
     PHASE_VARIANCE,
     PHASES,
+    TOOL_MEAN,
 )
 from lathe_chatter.model import Array, Integers
 
@@ -59,6 +61,12 @@ _FORGETTING = 0.01
 _RAMP = 3e-3
 """Relative change of speed in `SPEEDS` hops that is a ramp."""
 _RAMP_HOLD = 20
+_NEW, _BETWEEN, _OLD = 8, 4, 16
+"""Hops whose means are compared, and hops between them, to find a step of the mean force."""
+_STEP, _STEP_PART = 4.0, 0.04
+"""Standard errors, and part of the mean, that make a step."""
+_STEP_HOLD = 300
+"""Hops until the baseline is that of the new cut."""
 SETTLING = 20
 """Hops after which something is known."""
 
@@ -192,6 +200,33 @@ def follow_speed(ledger: Ledger, speed: float, hops_a_turn: float) -> None:
             restart_baseline(ledger)
     if oldest > 0.0 and abs(speed / oldest - 1.0) > _RAMP:
         flags[RAMPING] = int(_RAMP_HOLD + hops_a_turn)
+
+
+@compiled()
+def follow_push(ledger: Ledger, products: Array, newest: int) -> None:
+    """Notice a step of the mean force: another cut, whose vibration may stay larger than before.
+
+    Args:
+        ledger: Changed in place.
+        products: Of the last hops (HOPS, PRODUCTS_SIZE), as a ring.
+        newest: Its newest place.
+    """
+    flags = ledger.flags
+    flags[STEPPED] = max(flags[STEPPED] - 1, 0)
+    if flags[SEEN] < SETTLING + _NEW + _BETWEEN + _OLD:
+        return
+    new = old = new_square = old_square = 0.0
+    for back in range(_NEW + _BETWEEN + _OLD):
+        mean = products[(newest - back) % HOPS, TOOL_MEAN]
+        if back < _NEW:
+            new += mean / _NEW
+            new_square += mean**2 / _NEW
+        elif back >= _NEW + _BETWEEN:
+            old += mean / _OLD
+            old_square += mean**2 / _OLD
+    variance = max(new_square - new**2, 0.0) / _NEW + max(old_square - old**2, 0.0) / _OLD
+    if abs(new - old) > max(_STEP * math.sqrt(variance), _STEP_PART * abs(old)):
+        flags[STEPPED] = _STEP_HOLD
 
 
 @compiled()

@@ -50,6 +50,8 @@ _REFERENCE = 3
 _GUESS_EVERY = 8
 _CLEAR = 0.4
 """Part of the signal that is no noise, from which on an identified cut is followed."""
+_DEEPER = 1.3
+"""Times the identified C w: the cut whose rightmost root is followed too."""
 _NOISE_HOPS = 32
 
 
@@ -99,8 +101,8 @@ def take_hops(
         windows: What they say (windows, WINDOW_SIZE), written.
         mechanics: From `identification.mechanics_of`.
         figures: In the order of `HopFigures`.
-        guess: The rightmost root of the last cut that was looked at, its C w and its k (3,),
-            changed in place.
+        guess: The rightmost root of the last cut that was looked at, its C w and its k, and the
+            rightmost root of a deeper one (4,), changed in place.
         place: The newest hop in the rings (1,), changed in place.
         ledger: Of the judgement, changed in place.
 
@@ -138,7 +140,9 @@ def take_hops(
             noise_sums(kernels.spill, tool * share, workpiece * share, thinned / speed, noise)
             known[0], known[1] = 1.0 / speed, ledger.numbers[USUAL]
             known[2], known[3] = guess[1].real, guess[2].real
-            identify(products, newest, WINDOWS, mechanics, noise, known, guess[0], windows)
+            identify(
+                products, newest, WINDOWS, mechanics, noise, known, guess[0], guess[3], windows
+            )
             if ledger.flags[SEEN] % _GUESS_EVERY == 0:
                 reference = windows[_REFERENCE]
                 if reference[CLEARNESS] > _CLEAR:
@@ -150,6 +154,12 @@ def take_hops(
                         mechanics, cutting, stiffness, 1.0 / speed, guess[0]
                     )
                     guess[1], guess[2] = cutting, stiffness
+                    # A value that is too low by chance leads to the mode that is not in danger.
+                    longest = windows[WINDOWS.size - 1, CUTTING]
+                    deeper = _DEEPER * (max(cutting, longest) if longest > 0.0 else cutting)
+                    guess[3] = rightmost_in_band(
+                        mechanics, deeper, stiffness, 1.0 / speed, guess[3]
+                    )
         else:
             _powers(products, newest, windows)
         told[0], told[1], told[2] = speed, figures[_PERIOD], figures[_TOOL]

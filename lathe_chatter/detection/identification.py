@@ -221,7 +221,7 @@ def _fit(
 @compiled()
 def identify(
     products: Array, newest: int, lengths: Integers, mechanics: Array, noise: Array,
-    figures: Array, guess: complex, windows: Array,
+    figures: Array, guess: complex, deeper: complex, windows: Array,
 ) -> None:  # fmt: skip
     """What every window says.
 
@@ -234,6 +234,7 @@ def identify(
         figures: Delay, s; mean square misfit of the force in quiet cutting, N2, or nan; and of
             a similar cut C w and k, N/m (4,).
         guess: The rightmost root for the similar cut, 1/s.
+        deeper: That of a deeper one, which may be of another mode: both are followed.
         windows: Written (windows, WINDOW_SIZE); nan where unknown.
     """
     delay, usual = figures[0], figures[1]
@@ -279,6 +280,10 @@ def identify(
         cutting = max(known[CUTTING], 0.0)
         stiffness = min(max(stiffness, mechanics[SOFTEST]), mechanics[STIFFEST])
         s = root_near(mechanics, cutting, stiffness, delay, guess)
+        if not s.real > 0.0:
+            other = root_near(mechanics, cutting, stiffness, delay, deeper)
+            if other.real > s.real or s.real != s.real:
+                s = other
         _, slope, by_cutting, by_stiffness = characteristic(
             mechanics, cutting, stiffness, delay, s
         )

@@ -21,6 +21,7 @@ from lathe_chatter.detection.energy import (
     follow_energy,
     follow_misfit,
     follow_phase,
+    follow_push,
     follow_speed,
     growth_by_energy,
     restart_baseline,
@@ -65,6 +66,7 @@ from lathe_chatter.detection.ledger import (
     SMALLEST,
     STABLE,
     STATE,
+    STEPPED,
     STRICTNESS,
     SUSPECTED,
     UNKNOWN,
@@ -93,6 +95,10 @@ _SMALLEST_GROWTH = 0.2
 """Growth rate below which nothing is called chatter, 1/s."""
 _TRUSTED = 3
 """The window by which it is judged whether the signal stands out of the sensors' noise."""
+_AFTER_STEP = 1.2
+"""By how much more the energy must have risen while it is compared with that of another cut."""
+_BESIDE_FORCED = 1.3
+"""By how much surer growth must be beside a large vibration that is the spindle's own."""
 _STRICTER = 1.5
 """By how much surer growth must be without a model."""
 _PATIENT = 4
@@ -114,7 +120,7 @@ _QUIET = 0.12
 
 
 @compiled()
-def _score(ledger: Ledger, windows: Array, model: bool) -> float:
+def _score(ledger: Ledger, windows: Array, model: bool, forced: bool) -> float:
     """1 is an alarm."""
     numbers, flags = ledger.numbers, ledger.flags
     score, rise = 0.0, numbers[RISE]
@@ -126,6 +132,8 @@ def _score(ledger: Ledger, windows: Array, model: bool) -> float:
         if model and sureness == sureness:
             score += _GROWTH_SHARE * trust * min(sureness, _MOST_GROWTH)
         score /= _ENERGY_LIMIT if model else _ENERGY_ALONE
+        if flags[STEPPED] != 0:
+            score /= _AFTER_STEP
     free = model or flags[SINCE_JUMP] > 12
     # Growth that is read from the energy says nothing new, and noise looks like it now and then.
     first = 0 if model else _PATIENT
@@ -136,6 +144,7 @@ def _score(ledger: Ledger, windows: Array, model: bool) -> float:
                 break
             if known[GROWTH] > _SMALLEST_GROWTH:
                 limit = LIMITS[number] if model else _STRICTER * LIMITS[number]
+                limit *= _BESIDE_FORCED if forced else 1.0
                 score = max(score, known[GROWTH] / known[GROWTH_ERROR] / limit)
     return score
 
@@ -208,7 +217,7 @@ def _cuts(known: Array, products: Array, newest: int) -> bool:
 
 
 @compiled()
-def _state(ledger: Ledger, cutting: bool, forced_amplitude: float) -> int:
+def _state(ledger: Ledger, cutting: bool, forced: bool) -> int:
     numbers, flags = ledger.numbers, ledger.flags
     if flags[ALARMED] != 0:
         return CHATTER
@@ -218,7 +227,7 @@ def _state(ledger: Ledger, cutting: bool, forced_amplitude: float) -> int:
         return IDLE
     if numbers[SCORE] > _WATCH * numbers[STRICTNESS]:
         return WATCH
-    if numbers[RATIO] < _OFF_PHASE and numbers[FORCED_AMPLITUDE] > forced_amplitude:
+    if forced:
         return FORCED
     return STABLE
 
@@ -289,10 +298,12 @@ def judge(
     if omega == omega and speed > 0.0:
         comb = max(2.0 * abs(math.sin(0.5 * omega / speed)), 0.1)
     amplitude = 2.0 * math.sqrt(max(windows[1, WINDOW_TOOL_POWER], 0.0)) / comb / figures[4]
+    follow_push(ledger, products, newest)
     if model:
         follow_misfit(ledger, products[newest], windows[_TRUSTED, CLEARNESS] > 0.5)
     known = flags[RAMPING] == 0 and flags[SEEN] > SETTLING
-    numbers[SCORE] = _score(ledger, windows, model) if known else 0.0
+    forced = numbers[RATIO] < _OFF_PHASE and numbers[FORCED_AMPLITUDE] > figures[3]
+    numbers[SCORE] = _score(ledger, windows, model, forced) if known else 0.0
     stiff = figures[2] if model else 0.0
     if flags[ALARMED] == 0 and flags[RAMPING] == 0 and speed > 0.0:
         steady = _saturated(ledger, products, newest, strongest, stiff)
@@ -300,4 +311,4 @@ def judge(
     _decide(ledger, amplitude)
     _tell(ledger, windows, wave, model, amplitude)
     cutting = not model or _cuts(windows[WINDOWS.size - 1], products, newest)
-    flags[STATE] = _state(ledger, cutting, figures[3])
+    flags[STATE] = _state(ledger, cutting, forced)

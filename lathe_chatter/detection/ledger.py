@@ -56,8 +56,9 @@ IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = range(6)
     BLOCKS,
     BLOCK_FILL,
     SATURATED,
+    STEPPED,
     FLAGS_SIZE,
-) = range(13)
+) = range(14)
 
 
 class Ledger(NamedTuple):

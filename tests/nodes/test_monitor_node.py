@@ -14,7 +14,7 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Array, BearingContact, Cut
+from lathe_chatter.model import SAMPLE_COLUMNS, Array, BearingContact, Cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.monitor_node import MonitorNode
@@ -135,6 +135,18 @@ def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> N
     bench.spin_until(lambda: flags and flags[-1].data, 'the flag')
 
 
+def test_a_dead_sensor_is_done_without(start: Callable[..., Any], bench: Bench) -> None:
+    start(MonitorNode)
+    flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+    publisher = bench.talk(Float64MultiArray, '/lathe/samples')
+    samples = VirtualLathe(cut=UNSTABLE).advance(20_000)
+    samples[:, SAMPLE_COLUMNS.index('workpiece_displacement')] = np.nan
+    for k in range(0, len(samples), BLOCK):
+        publisher.publish(samples_to_message(samples[k : k + BLOCK]))
+        bench.executor.spin_once(timeout_sec=0.01)
+    bench.spin_until(lambda: flags and flags[-1].data, 'the flag')
+
+
 @pytest.mark.parametrize(
     ('message', 'complaint'),
     [
@@ -145,7 +157,7 @@ def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> N
         ),
         (
             samples_to_message(np.full((3, 8), np.nan)),
-            'The samples are not finite, or their times do not increase.',
+            'The times of the samples are not finite, or do not increase.',
         ),
     ],
     ids=['layout', 'columns', 'nan'],
