@@ -1,6 +1,6 @@
 """The figures of the chatter detector: how late, how often wrong, what it knows, what it costs.
 
-    python benchmarks/detection [--quick] [--plot FILE] [--json] [PART ...]
+    python benchmarks/detection [--quick] [--hours H] [--onsets N] [--plot FILE] [PART ...]
 
 Parts: check onsets benign limit advice cpu (all by default). Thresholds of the rivals, and the
 detector's own, belong to one set of seeds (calibration); what is printed is from another.
@@ -46,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('parts', nargs='*', metavar='PART', help=f'of {", ".join(PARTS)}')
     parser.add_argument('--quick', action='store_true', help='few cases: a smoke test')
     parser.add_argument('--scenarios', nargs='+', default=sorted(NOISES), choices=sorted(NOISES))
+    parser.add_argument('--hours', type=float, metavar='H', help='of stable cutting (10.5)')
+    parser.add_argument('--onsets', type=int, metavar='N', help='and events of a kind (240; 200)')
     parser.add_argument('--processes', type=int, default=os.cpu_count())
     parser.add_argument('--plot', metavar='FILE', help='draw delay against false-alarm rate')
     parser.add_argument('--json', action='store_true', help='print JSON')

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scenarios
 from advice import advice_figures
-from delays import quantiles, threshold_for
+from delays import quantiles, share_limits, threshold_for
 from onsets import ASKED, CALIBRATION
 from recording import DETECTOR, Traces, run
 from rivals import HOP, RIVALS
@@ -41,10 +41,11 @@ def check(_options: Any) -> list[str]:
 
 def benign(options: Any) -> list[str]:
     """What only looks like chatter: share of events with an alarm within 2 s."""
-    number = 8 if options.quick else 200
+    number = options.onsets or (8 if options.quick else 200)
+    minutes = round(60.0 * (options.hours or (0.1 if options.quick else 1.0)))
     lines = ['events without chatter that raise an alarm (rivals at their S1 threshold)']
     calm = run(
-        [scenarios.stable('S1', CALIBRATION + k) for k in range(4 if options.quick else 60)],
+        [scenarios.stable('S1', CALIBRATION + k) for k in range(max(4, minutes))],
         'S1 stable',
         options.processes,
     )
@@ -65,7 +66,10 @@ def benign(options: Any) -> list[str]:
         shares = []
         for name, threshold in limits.items():
             wrong = sum(_wrong(traces, name, threshold) for traces in found)
-            shares.append(f'{name} {100.0 * wrong / events:.1f} %')
+            least, most = share_limits(wrong, events)
+            shares.append(
+                f'{name} {100.0 * wrong / events:.1f} ({100.0 * least:.1f}-{100.0 * most:.1f}) %'
+            )
         lines.append(f'  {label:34s} {events} events: ' + ', '.join(reversed(shares)))
         if label.startswith('forced'):
             told = np.mean([traces.states[-1] == 'forced' for traces in found])

@@ -8,7 +8,7 @@ import numpy as np
 from recording import Traces
 from rivals import HOP
 from scenarios import MACHINE, Case
-from scipy.stats import chi2
+from scipy.stats import beta, chi2
 from simulator import RATE
 
 from lathe_chatter.model import Array
@@ -51,6 +51,13 @@ def confidence(count: int, hours: float) -> tuple[float, float]:
     """95 % limits of a Poisson rate."""
     low = 0.5 * chi2.ppf(0.025, 2 * count) if count else 0.0
     return low / hours, 0.5 * chi2.ppf(0.975, 2 * count + 2) / hours
+
+
+def share_limits(count: int, events: int) -> tuple[float, float]:
+    """95 % limits of a share by Clopper and Pearson."""
+    low = beta.ppf(0.025, count, events - count + 1) if count else 0.0
+    high = beta.ppf(0.975, count + 1, events - count) if count < events else 1.0
+    return float(low), float(high)
 
 
 def delays(onsets: Sequence[Traces], name: str, threshold: float) -> Array:

@@ -36,6 +36,7 @@ def onsets(options: Any) -> list[str]:
     """S0 to S3: delay, misses, false alarms, beside the limit and the rivals."""
     lines, curves = [], {}
     count, hours = (24, 0.1) if options.quick else (240, 10.5)
+    count, hours = options.onsets or count, options.hours or hours
     for noise in options.scenarios:
         stepped = noise in {'S0', 'S3'}
         make = scenarios.steps if stepped else scenarios.stable

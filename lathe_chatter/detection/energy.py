@@ -73,7 +73,7 @@ SETTLING = 20
 
 @compiled()
 def follow_energy(ledger: Ledger, newest: int) -> int:
-    """Baselines and innovations of the resonators; the strongest bin."""
+    """Baselines and innovations of the resonators; the strongest bin of the last two hops."""
     flags, numbers = ledger.flags, ledger.numbers
     now, before = ledger.motion[newest], ledger.motion[newest - 1]
     free = flags[ALARMED] == 0 and flags[HOLDING] == 0 and flags[RAMPING] == 0
@@ -91,7 +91,8 @@ def follow_energy(ledger: Ledger, newest: int) -> int:
             ledger.usual[1, j] += share * (before[j].real ** 2 + before[j].imag ** 2 - square)
             ledger.usual[2, j] += share * (innovation - ledger.usual[2, j])
             ledger.blocks[0, j] += energy / _BLOCK
-        level = math.log(max(energy, 1e-300) / ledger.baseline[j]) if known else energy
+        mean = 0.5 * (energy + before[j].real ** 2 + before[j].imag ** 2)
+        level = math.log(max(mean, 1e-300) / ledger.baseline[j]) if known else mean
         if level > most:
             strongest, most, jump = j, level, 0.0
             # Growth is no jump: it stays in proportion to what was there.

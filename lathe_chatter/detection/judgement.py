@@ -83,13 +83,15 @@ from lathe_chatter.detection.signals import (
 )
 from lathe_chatter.model import Array
 
-LIMITS = np.array([np.inf, 6.5, 5.5, 5.0, 4.6, 4.3])
+LIMITS = np.array([np.inf, 7.2, 6.1, 5.5, 5.1, 4.7])
 """Growth rate over its standard error that is an alarm by itself, in each window."""
-_ENERGY_LIMIT = 3.85
-"""Logarithm of the energy ratio, and half of growth over its error, that make an alarm."""
-_ENERGY_ALONE = 3.5
+_ENERGY_LIMIT = 3.05
+"""Logarithm of the energy ratio, and a share of growth over its error, that make an alarm."""
+_BLURRED = 0.92
+"""Part of that limit where the sensors' noise outweighs the vibration, and is the steadier."""
+_ENERGY_ALONE = 3.2
 """The same of the energy ratio alone, without a model of the machine."""
-_GROWTH_SHARE = 0.5
+_GROWTH_SHARE = 0.2
 _MOST_GROWTH = 6.0
 _SMALLEST_GROWTH = 0.2
 """Growth rate below which nothing is called chatter, 1/s."""
@@ -131,7 +133,10 @@ def _score(ledger: Ledger, windows: Array, model: bool, forced: bool) -> float:
         score = rise
         if model and sureness == sureness:
             score += _GROWTH_SHARE * trust * min(sureness, _MOST_GROWTH)
-        score /= _ENERGY_LIMIT if model else _ENERGY_ALONE
+        if model:
+            score /= _ENERGY_LIMIT * (_BLURRED + (1.0 - _BLURRED) * trust)
+        else:
+            score /= _ENERGY_ALONE
         if flags[STEPPED] != 0:
             score /= _AFTER_STEP
     free = model or flags[SINCE_JUMP] > 12
