@@ -100,6 +100,8 @@ def test_ros2_run_finds_the_executables_after_colcon_build(sources: Path) -> Non
     assert (prefix / 'share/ament_index/resource_index/packages/lathe_chatter').is_file()
     assert (prefix / 'share/lathe_chatter/package.xml').is_file()
     assert (prefix / 'share/lathe_chatter/config/scenarios/clearance.yaml').is_file()
+    for name in ('foxglove.json', 'plotjuggler.xml'):
+        assert (prefix / 'share/lathe_chatter/config/layouts' / name).is_file()
     installed = next(prefix.glob('l*/python3*/site-packages'))
     started = start_wrong(
         folder / 'lathe', PYTHONPATH=os.pathsep.join([str(installed), *sys.path])
