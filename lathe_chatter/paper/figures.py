@@ -25,6 +25,8 @@ WINDOWS = {3000.0: 0.1, 10000.0: 0.12}
 _TIME, _DISPLACEMENTS, _VELOCITIES = 0, (2, 4), (3, 5)
 _BODIES = (('tool', TOOL), ('workpiece', WORKPIECE))
 _MILLI = 1e3
+_HEADROOM = 0.18
+"""Of a time history, above its curves."""
 
 
 class Picture(NamedTuple):
@@ -149,7 +151,9 @@ def _draw_history(
     axes.set_xlabel('time / ms')
     axes.set_ylabel(scale.label(name))
     axes.margins(x=0.0)
-    axes.legend(loc='upper left', fontsize=8)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + _HEADROOM * (high - low))  # the legend covers no curve
+    axes.legend(loc='upper right', ncols=2, fontsize=8)
     grid(axes)
 
 
