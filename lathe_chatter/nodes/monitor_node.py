@@ -67,7 +67,7 @@ class MonitorNode(ParameterNode):
         if source is ModelSource.LATHE:
             self._asked = AskedMachine(self, self._learn)
         self._detector = self._new_detector()
-        self._continuity = Continuity()
+        self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
         self._state, self._flag = _UNKNOWN, False
         self._figures: Mapping[str, float] = {}
@@ -153,10 +153,13 @@ class MonitorNode(ParameterNode):
         """Notice lost samples and a lathe that has started again."""
         before = self._continuity.last
         joint = self._continuity.join(times)
+        if joint in {Joint.FIRST, Joint.RESTART}:
+            self._since = f'{times[0]:.6f}'
         if joint is Joint.FIRST:
-            self.get_logger().info(f'Listening from {times[0]:.6f} s on.')
+            self.get_logger().info(f'Listening from {self._since} s on.')
         elif joint is Joint.RESTART:
-            self.get_logger().info(f'At {before:.6f} s: the lathe started again; so do I.')
+            again = f'the lathe started again, and I with it from {self._since} s on'
+            self.get_logger().info(f'At {before:.6f} s: {again}.')
             self._begin_again()
             if self._asked is not None:
                 self._asked.ask()  # it may be another machine
@@ -223,6 +226,7 @@ class MonitorNode(ParameterNode):
         if silent and self._state != _UNKNOWN:
             self._state = _UNKNOWN
             self._state_publisher.publish(String(data=self._state))
+            self.get_logger().info(f'At {self._continuity.last:.6f} s: no samples come any more.')
         self._diagnostics.publish(self._statuses(silent=silent))
         self._counted = _Counted(self._continuity.samples, self._continuity.lost)
 
@@ -241,6 +245,7 @@ class MonitorNode(ParameterNode):
             'gaps': heard.gaps,
             'restarts of the lathe': heard.restarts,
             'simulated time, s': heard.last if heard.last is not None else 'none yet',
+            'listening from, s': self._since,
         }
         if self._complaint:
             return Status('samples', ERROR, self._complaint, values)

@@ -20,7 +20,7 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_snapshots import ParameterSnapshots
 from lathe_chatter.nodes.parameters import RECORDER
 from lathe_chatter.nodes.recorded_topic import RecordedTopic, topic_of
-from lathe_chatter.nodes.recording_status import recording_status
+from lathe_chatter.nodes.recording_status import news, recording_status
 from lathe_chatter.nodes.running import run_node
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.closing import SUMMARY, closing_summary
@@ -151,6 +151,7 @@ class RecorderNode(ParameterNode):
             return 'Nothing is being recorded.'
         for topic in self._topics.values():
             topic.end()
+        self._tell()
         writer, self._writer = self._writer, None
         heard = {name: json.dumps(topic.reception()) for name, topic in self._topics.items()}
         stalls = {STALLS: str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
@@ -253,10 +254,16 @@ class RecorderNode(ParameterNode):
         if self._writer is None:
             return
         self._drain()
+        self._tell()
         try:
             self._writer.commit_soon()
         except (OSError, LatheChatterError) as error:
             self._fail(error)
+
+    def _tell(self) -> None:
+        """Say from when there are samples, and where they are missing."""
+        for sentence in news(self._journal):
+            self.get_logger().info(sentence)
 
     def _fail(self, error: Exception) -> None:
         folder = self.run

@@ -1,13 +1,14 @@
-"""What /diagnostics shows of a recording."""
+"""What /diagnostics shows of a recording, and what the recorder says while it records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from lathe_chatter.continuity import Joint
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
-from lathe_chatter.recording.journal import Journal
+from lathe_chatter.recording.journal import Journal, Seam
 from lathe_chatter.recording.stalls import Stalls
 
 
@@ -41,6 +42,7 @@ def recording_status(
             f'{name}: samples before the first': str(heard.head),
             f'{name}: samples lost': str(heard.continuity.lost),
             f'{name}: silences': str(heard.silences),
+            f'{name}: restarts of the lathe': str(heard.continuity.restarts),
         }
     if failure:
         return Status('recording', ERROR, failure, values)
@@ -48,6 +50,33 @@ def recording_status(
     if complaints:
         return Status('recording', WARN, complaints, values)
     return Status('recording', OK, 'recording' if run else 'not recording', values)
+
+
+def news(journal: Journal) -> Iterator[str]:
+    """Sentences about where samples began, began again or are missing; each is told once.
+
+    Args:
+        journal: Of the run; the seams that are told are taken away.
+    """
+    for name, heard in journal.samples.items():
+        gaps = [seam for seam in heard.seams if seam.joint is Joint.GAP]
+        for seam in heard.seams:
+            if seam.joint is not Joint.GAP:
+                yield f'{name} {_begins(seam)}.'
+        if gaps:  # there may be many
+            missing = sum(seam.missing for seam in gaps)
+            yield (
+                f'{name}: {missing} samples between {gaps[0].before:.6f} s and '
+                f'{gaps[-1].after:.6f} s did not come.'
+            )
+        heard.seams.clear()
+
+
+def _begins(seam: Seam) -> str:
+    since = f'is recorded from {seam.after:.6f} s on'
+    if seam.joint is Joint.RESTART:
+        since = f'{since}, after the lathe started again at {seam.before:.6f} s'
+    return f'{since}, without the {seam.missing} samples before' if seam.missing else since
 
 
 def _complaints(topics: Mapping[str, RecordedTopic], journal: Journal) -> Iterator[str]:

@@ -9,12 +9,12 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import Counter, deque
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lathe_chatter.changes import Change, parse_change
-from lathe_chatter.continuity import Continuity
+from lathe_chatter.continuity import Continuity, Joint
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE, Layout, layout_of
 from lathe_chatter.recording.reading.sample_series import missing_in
@@ -23,12 +23,30 @@ from lathe_chatter.recording.ros_messages import LOG_TYPE, types
 FLAG_TYPE = 'std_msgs/msg/Bool'
 _FLAG_BYTE = 4
 """Where the truth is in a serialised Bool, after the encapsulation."""
+_UNTOLD = 1000
+"""Seams that are kept for who tells of them."""
 _REMEMBERED = 1000
 """Blocks about which it is known when they came, to date other messages by."""
 _SILENCE = 0.1
 """s without a block that count as silence, where blocks usually come more often."""
 _SLOWER = 10.0
 """So many times longer than usual must a silence be."""
+
+
+class Seam(NamedTuple):
+    """Where samples do not simply follow those before.
+
+    Attributes:
+        joint: What is there instead.
+        before: Simulated time of the last sample before, s; None before the first.
+        after: Of the first after it, s.
+        missing: How many samples of the lathe are missing there.
+    """
+
+    joint: Joint
+    before: float | None
+    after: float
+    missing: int
 
 
 @dataclass
@@ -42,6 +60,8 @@ class SamplesHeard:
         silences: How often it published nothing for much longer than usual.
         longest: The longest time from one block to the next, s.
         complaint: What is wrong with the layout of a message; empty where all is well.
+        seams: The latest places where samples are missing or begin; for who tells of them to
+            take away.
     """
 
     continuity: Continuity = field(default_factory=Continuity)
@@ -50,6 +70,7 @@ class SamplesHeard:
     silences: int = 0
     longest: float = 0.0
     complaint: str = ''
+    seams: deque[Seam] = field(default_factory=lambda: deque(maxlen=_UNTOLD))
     _layout: Layout | None = None
     _beginning: bytes = b''
     _published: int = 0
@@ -68,14 +89,24 @@ class SamplesHeard:
         if not np.isfinite(times).all():
             self.complaint = 'The times of samples are no numbers.'
             return
-        self.continuity.join(times)
         last = float(times[-1])
-        if self.first is None:
-            self.first = float(times[0])
-            step = (last - self.first) / (len(times) - 1) if len(times) > 1 else self.first
-            self.head = max(missing_in((0.0, self.first), step), 0) if step > 0.0 else 0
+        self._join(times)
         self._came.append((log_time, last))
         self._follow(publish_time)
+
+    def _join(self, times: Any) -> None:
+        """Join a block by its times (n,), s."""
+        before, lost = self.continuity.last, self.continuity.lost
+        joint = self.continuity.join(times)
+        if joint is Joint.CONTIGUOUS:
+            return
+        first, missing = float(times[0]), self.continuity.lost - lost
+        if joint is not Joint.GAP:
+            step = (float(times[-1]) - first) / (len(times) - 1) if len(times) > 1 else first
+            missing = max(missing_in((0.0, first), step), 0) if step > 0.0 else 0
+        if joint is Joint.FIRST:
+            self.first, self.head = first, missing
+        self.seams.append(Seam(joint, before, first, missing))
 
     def time_at(self, log_time: int) -> float:
         """Simulated time when another message was received, s: that of the block about then."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 # Before rclpy is imported anywhere: the tests of one machine must not meet those of another.
@@ -14,9 +16,12 @@ import domain_coordinator
 import pytest
 import rclpy
 from bench import Bench
+from node_processes import NodeProcesses
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+
+from lathe_chatter.warm_up import warm_up
 
 PATIENCE = 60.0
 SpinUntil = Callable[..., None]
@@ -79,3 +84,18 @@ def start(context: Context, executor: SingleThreadedExecutor) -> Callable[..., A
         return node
 
     return make
+
+
+@pytest.fixture(scope='session')
+def compiled() -> None:
+    """The inner loops are compiled, or else each process would do it for itself."""
+    warm_up()
+
+
+@pytest.fixture
+def nodes(domain: int, compiled: None, tmp_path: Path) -> Iterator[NodeProcesses]:  # noqa: ARG001
+    """Nodes as processes; what they said is shown where a test fails."""
+    started = NodeProcesses(tmp_path)
+    yield started
+    started.end()
+    sys.stdout.write(started.said())
