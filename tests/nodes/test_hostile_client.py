@@ -1,0 +1,82 @@
+"""A client that floods a lathe with requests, or asks what nobody can do: the cut goes on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bench import Bench, messages_of
+from node_processes import NodeProcesses, Reports, Samples, contiguous
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rclpy.qos import HistoryPolicy, QoSProfile
+
+from lathe_chatter.changes import parse_change
+
+FLOOD = 10_000
+TICK = 0.002
+UNKNOWN_TYPE = 200
+SERVICE = '/lathe/set_parameters'
+
+
+def test_ten_thousand_sets_at_once_leave_it_cutting(bench: Bench, nodes: NodeProcesses) -> None:
+    reports, samples = Reports(bench), Samples(bench)
+    nodes.start('lathe')
+    # Nothing of the flood is to be lost on the way out; what the lathe keeps of it is its choice.
+    qos = QoSProfile(depth=1, history=HistoryPolicy.KEEP_ALL)
+    client = bench.node.create_client(SetParameters, SERVICE, qos_profile=qos)
+    bench.spin_until(client.service_is_ready, 'the service')
+    bench.spin_until(lambda: len(samples) > 10, 'samples')
+    depths = np.linspace(0.0001, 0.0009, FLOOD).tolist()
+    futures = [client.call_async(set_of(depth)) for depth in depths]
+    bench.spin_until(lambda: depth_of(bench) == depths[-1], 'the last value')
+
+    after = len(samples)
+    bench.spin_until(lambda: len(samples) > after + 100, 'samples after the flood')
+    (times,) = samples.runs()
+    assert contiguous(times)
+    answers = [f.result().results[0] for f in futures if f.done()]
+    assert answers
+    assert all(answer.successful for answer in answers)
+    # The log grows with the ticks and not with the requests.
+    told = [c for c in map(parse_change, reports.sentences('lathe')) if c is not None]
+    assert len({change.time for change in told}) == len(told)
+    since = reports.count()
+    bench.spin_until(lambda: reports.value('/lathe: pace', 'ticks', since), 'a report')
+    given_up = float(reports.value('/lathe: pace', 'lag given up, s'))
+    assert given_up < 0.5 * samples.ends[-1]
+
+
+def test_requests_that_nobody_can_fulfil_are_refused_with_a_reason(
+    bench: Bench, nodes: NodeProcesses
+) -> None:
+    samples = Samples(bench)
+    lathe = nodes.start('lathe')
+    known = messages_of({'depth_of_cut': 0.001})
+    (typed,) = messages_of({'depth_of_cut': 0.001})
+    typed.value.type = UNKNOWN_TYPE
+    hostile: list[Any] = [typed, *messages_of({'no such name': 1, '': 2.0, 'depth_of_cut': [1.0]})]
+    hostile += messages_of({'x' * 100_000: True, 'seed': 2**62, 'real_time_factor': -1})
+    for parameter in hostile:
+        request = SetParameters.Request(parameters=[parameter])
+        (result,) = bench.call(SetParameters, SERVICE, request).results
+        together = SetParametersAtomically.Request(parameters=[*known, parameter])
+        atomic = bench.call(SetParametersAtomically, f'{SERVICE}_atomically', together).result
+        for answer in (result, atomic):
+            assert not answer.successful
+            assert answer.reason
+    assert depth_of(bench) == 0.0005
+    after = len(samples)
+    bench.spin_until(lambda: len(samples) > after + 10, 'samples after all that')
+    (times,) = samples.runs()
+    assert contiguous(times)
+    assert lathe.poll() is None
+
+
+def set_of(depth: float) -> SetParameters.Request:
+    return SetParameters.Request(parameters=messages_of({'depth_of_cut': depth}))
+
+
+def depth_of(bench: Bench) -> float:
+    request = GetParameters.Request(names=['depth_of_cut'])
+    (value,) = bench.call(GetParameters, '/lathe/get_parameters', request).values
+    return float(value.double_value)
