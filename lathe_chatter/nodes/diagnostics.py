@@ -9,10 +9,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from lathe_chatter.nodes.overrides import publisher_overrides
 
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
 ERROR, STALE = DiagnosticStatus.ERROR, DiagnosticStatus.STALE
+
+_TOPIC = '/diagnostics'
 
 
 @dataclass(frozen=True)
@@ -48,9 +51,9 @@ class Diagnostics:
         self._hardware = f'{self._hardware} {hardware}'.strip()
         self._publisher = node.create_publisher(
             DiagnosticArray,
-            '/diagnostics',
+            _TOPIC,
             QoSProfile(depth=10),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            qos_overriding_options=publisher_overrides(node, _TOPIC),
         )
         self._shown: list[tuple[str, bytes, str]] = []
 

@@ -72,6 +72,9 @@ class LatheNode(ParameterNode):
         warm_up()  # compiled before the first tick is due
         self._lathe = lathe_from(values)
         self._pending: Cut | None = None
+        self._topics = LatheTopics(
+            self, values['tick_rate'], publish_clock=values['publish_clock']
+        )
         self._record = LatheRecord(self, values)
 
         self._control = RunControl()
@@ -84,9 +87,6 @@ class LatheNode(ParameterNode):
         self._free = self._factor == 0.0
         self._meter = LatheMeter(self._pacer, tick)
         self._real_time = RealTime(values['realtime_priority'])
-        self._topics = LatheTopics(
-            self, values['tick_rate'], publish_clock=values['publish_clock']
-        )
         self._diagnostics = Diagnostics(self, 'virtual lathe')
         self._create_services()
         self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=10))

@@ -9,13 +9,13 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.nodes.messages import Wire, joint_states, time_message
+from lathe_chatter.nodes.overrides import publisher_overrides
 
 _SCALARS = {
     '~/tool/displacement': SAMPLE_COLUMNS.index('tool_displacement'),
@@ -46,7 +46,7 @@ class LatheTopics:
         """Create the publishers."""
 
         def publisher(kind: Any, topic: str, qos: QoSProfile) -> Publisher:
-            options = QoSOverridingOptions.with_default_policies()
+            options = publisher_overrides(node, topic)
             return node.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
         deep = max(10, round(_HISTORY * tick_rate))

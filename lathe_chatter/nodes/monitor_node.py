@@ -22,6 +22,7 @@ from lathe_chatter.nodes.asked_machine import AskedMachine
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.messages import BlockReader
 from lathe_chatter.nodes.monitor_words import clearance, details, onset
+from lathe_chatter.nodes.overrides import publisher_overrides
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.running import run_node
@@ -213,8 +214,9 @@ class MonitorNode(ParameterNode):
             self._figure_publishers[name].publish(Float64(data=value))
 
     def _publisher(self, kind: Any, name: str, qos: QoSProfile) -> Publisher:
-        options = QoSOverridingOptions.with_default_policies()
-        return self.create_publisher(kind, f'~/{name}', qos, qos_overriding_options=options)
+        topic = f'~/{name}'
+        options = publisher_overrides(self, topic)
+        return self.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
     # -- diagnostics -----------------------------------------------------------------------
 

@@ -33,6 +33,10 @@ WRONG = {
     (LATHE, 'use_sim_time:=yes please'): (
         "use_sim_time is 'yes please': it must be true or false."
     ),
+    (LATHE, 'qos_overrides./lathe/samples.publisher.history:=keep_all'): (
+        "qos_overrides./lathe/samples.publisher.history is 'keep_all': it must be keep_last, for "
+        'a node does not wait for its readers.'
+    ),
     (MONITOR, 'tool.mass:=-1'): f'tool.mass is -1 kg: it must be {TABLE["tool.mass"].allowed}.',
 }
 
