@@ -79,7 +79,7 @@ def turns(onsets: Sequence[Traces]) -> Array:
 def quantiles(values: Array) -> tuple[float, float]:
     """Median and 95 %, of values that may be infinite."""
     ordered = np.sort(values)
-    return float(ordered[len(ordered) // 2]), float(ordered[int(0.95 * len(ordered))])
+    return float(np.median(ordered)), float(ordered[int(0.95 * len(ordered))])
 
 
 def rates_of(case: Case) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from rivals import HOP, RIVALS
 from scenarios import Case
 from simulator import COLUMNS, RATE, simulate
 
-from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.model import Array
 
 DETECTOR = 'this detector'
@@ -26,8 +26,8 @@ class Traces(NamedTuple):
     Attributes:
         case: What was recorded.
         scores: Of each detector, one value a hop.
-        growth: The detector's growth rate, 1/s, a value a hop.
-        frequency: Its frequency, Hz.
+        growth: The growth rate that the detector tells, 1/s, a value a hop.
+        frequency: The frequency, Hz.
         states: Its states.
         cpu: What the detector took, s.
     """
@@ -53,14 +53,22 @@ def record(case: Case) -> Traces:
     cpu = time.process_time() - begin
     scores = {name: rival(samples) for name, rival in RIVALS.items()}
     scores[DETECTOR] = np.nan_to_num(np.array([e.score for e in estimates]))
+    told = _told(samples) if case.onset is not None else estimates
     return Traces(
         case,
         scores,
-        np.array([e.growth_rate for e in estimates]),
-        np.array([e.frequency for e in estimates]),
+        np.array([e.growth_rate for e in told]),
+        np.array([e.frequency for e in told]),
         [e.state for e in estimates],
         cpu,
     )
+
+
+def _told(samples: Array) -> list[Estimate]:
+    """What a detector that does alarm says, a value a hop."""
+    detector = ChatterDetector()
+    starts = range(0, len(samples) - HOP + 1, HOP)
+    return [detector.update(samples[start : start + HOP], COLUMNS) for start in starts]
 
 
 def run(cases: Sequence[Case], label: str, processes: int) -> list[Traces]:

@@ -57,7 +57,8 @@ def once_per_turn(samples: Array) -> Array:
     spread = _rolling_variance(at, last[good], last[good] - _TURNS)
     begin = times[last[good] - _TURNS - 1].astype(np.int64)
     whole = _rolling_variance(relative, ends[good], begin)
-    result[good] = spread / np.maximum(whole, 1e-300)
+    with np.errstate(over='ignore'):  # what grows without bound, and is flagged long before
+        result[good] = spread / np.maximum(whole, 1e-300)
     return result
 
 

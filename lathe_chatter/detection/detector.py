@@ -18,7 +18,7 @@ from lathe_chatter.detection.states import STATES, Estimate, Mode
 from lathe_chatter.model import Array, Machine
 
 _PAPER = Machine()
-_DECAY = 16.0
+_DECAY = 32.0
 """Of the resonators, 1/s: as narrow as the growth of chatter allows."""
 _HOP = 0.01
 """Length of a hop, about, s: what is judged together, against the decay of the resonators."""

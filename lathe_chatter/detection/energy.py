@@ -63,8 +63,8 @@ _RAMP = 3e-3
 _RAMP_HOLD = 20
 _NEW, _BETWEEN, _OLD = 8, 4, 16
 """Hops whose means are compared, and hops between them, to find a step of the mean force."""
-_STEP, _STEP_PART = 4.0, 0.04
-"""Standard errors, and part of the mean, that make a step."""
+_STEP, _STEP_PART = 6.0, 0.04
+"""Standard errors, and part of the mean, that make a step; the errors come of few hops."""
 _STEP_HOLD = 300
 """Hops until the baseline is that of the new cut."""
 SETTLING = 20

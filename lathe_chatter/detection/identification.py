@@ -75,6 +75,8 @@ from lathe_chatter.model import Array, Integers, Machine
 _MOST_SEEDS = 32
 _STEP_LIMIT = 60.0
 """Largest Newton step, 1/s: no leap into another lobe."""
+_LIKELY = 2.0
+"""Standard errors within which C w may well be."""
 _CORRELATION = 1.2
 """Variance of a sum over outputs that overlap, over what independent ones would have; checked
 by `python benchmarks/detection check`."""
@@ -290,7 +292,14 @@ def identify(
         # Far off the curve is flat, and would make a wild value look sure.
         of_cutting = max(abs((by_cutting / slope).real), usual_slopes[0])
         of_stiffness = max(abs((by_stiffness / slope).real), usual_slopes[1])
-        variance = (known[CUTTING_ERROR] * of_cutting) ** 2 + (error * of_stiffness) ** 2
+        by_cutting_error = known[CUTTING_ERROR] * of_cutting
+        if s.real > 0.0:
+            # Growth flattens with C w; what is sure is how much less the least likely C w gives.
+            least = max(cutting - _LIKELY * known[CUTTING_ERROR], 0.0)
+            lower = root_near(mechanics, least, stiffness, delay, s)
+            if lower.real == lower.real:
+                by_cutting_error = max(by_cutting_error, (s.real - lower.real) / _LIKELY)
+        variance = by_cutting_error**2 + (error * of_stiffness) ** 2
         known[STIFFNESS], known[STIFFNESS_ERROR] = stiffness, error
         known[GROWTH], known[GROWTH_ERROR] = s.real, math.sqrt(variance)
         known[ANGULAR_FREQUENCY] = s.imag

@@ -83,31 +83,37 @@ from lathe_chatter.detection.signals import (
 )
 from lathe_chatter.model import Array
 
-LIMITS = np.array([np.inf, 7.2, 6.1, 5.5, 5.1, 4.7])
+LIMITS = np.array([10.0, 7.2, 6.1, 5.5, 5.1, 4.7])
 """Growth rate over its standard error that is an alarm by itself, in each window."""
-_ENERGY_LIMIT = 3.05
+_ENERGY_LIMIT = 2.92
 """Logarithm of the energy ratio, and a share of growth over its error, that make an alarm."""
-_BLURRED = 0.92
+_BLURRED = 0.873
 """Part of that limit where the sensors' noise outweighs the vibration, and is the steadier."""
 _ENERGY_ALONE = 3.2
 """The same of the energy ratio alone, without a model of the machine."""
-_GROWTH_SHARE = 0.2
+_GROWTH_SHARE = 0.1
 _MOST_GROWTH = 6.0
 _SMALLEST_GROWTH = 0.2
 """Growth rate below which nothing is called chatter, 1/s."""
 _TRUSTED = 3
 """The window by which it is judged whether the signal stands out of the sensors' noise."""
-_AFTER_STEP = 1.2
-"""By how much more the energy must have risen while it is compared with that of another cut."""
+_AFTER_STEP, _AFTER_CLEAR_STEP = 1.2, 1.3
+"""By how much more the energy must have risen while it is compared with that of another cut: in
+the noise of the sensors, and where the growth rate can tell by itself."""
+_SURELY_STABLE = -2.0
+"""Growth rate over its error, in one of the shorter windows, that outweighs any rise of energy."""
+_VETO = 0.9
 _BESIDE_FORCED = 1.3
 """By how much surer growth must be beside a large vibration that is the spindle's own."""
 _STRICTER = 1.5
 """By how much surer growth must be without a model."""
 _PATIENT = 4
 """The shortest window whose growth is believed without a model."""
-_RAISED = 0.7
+_RAISED = 1.5
 """Logarithm of the energy ratio without which the growth rate alone is no alarm."""
 _WATCH = 0.75
+_ONSET = 8
+"""Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
 
 _OFF_PHASE, _ON_PHASE = 0.2, 0.9
 """Once-per-turn variance over all: below the spindle's own vibration, above chatter."""
@@ -119,6 +125,16 @@ _CUTS, _PUSHED = 4.0, 32
 """Standard errors from which on a force is one, and hops over which its mean is taken."""
 _QUIET = 0.12
 """Part of its peak at which chatter is over, if it is not back at the baseline before."""
+
+
+@compiled()
+def _surely_stable(windows: Array) -> bool:
+    """Whether one of the windows that know of a new cut at once says that it is stable."""
+    for number in range(_TRUSTED + 1):
+        known = windows[number]
+        if known[GROWTH] < _SURELY_STABLE * known[GROWTH_ERROR]:
+            return True
+    return False
 
 
 @compiled()
@@ -138,7 +154,9 @@ def _score(ledger: Ledger, windows: Array, model: bool, forced: bool) -> float:
         else:
             score /= _ENERGY_ALONE
         if flags[STEPPED] != 0:
-            score /= _AFTER_STEP
+            score /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
+        if model and trust >= 0.5 and _surely_stable(windows):
+            score = min(score, _VETO)
     free = model or flags[SINCE_JUMP] > 12
     # Growth that is read from the energy says nothing new, and noise looks like it now and then.
     first = 0 if model else _PATIENT
@@ -245,7 +263,10 @@ def _tell(
     numbers = ledger.numbers
     numbers[AMPLITUDE] = amplitude
     best = -1
+    alarmed, since = ledger.flags[ALARMED] != 0, ledger.flags[SINCE_ALARM]
     for number in range(windows.shape[0]):
+        if alarmed and best >= 0 and WINDOWS[number] > since + _ONSET:
+            break
         error = windows[number, GROWTH_ERROR]
         if error == error and (best < 0 or error < windows[best, GROWTH_ERROR]):
             best = number

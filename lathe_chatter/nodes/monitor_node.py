@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.model import Array, Machine
 from lathe_chatter.nodes.asked_machine import AskedMachine
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.drained import Drained
 from lathe_chatter.nodes.messages import BlockReader
 from lathe_chatter.nodes.monitor_words import clearance, details, onset
 from lathe_chatter.nodes.overrides import publisher_overrides
@@ -85,24 +86,25 @@ class MonitorNode(ParameterNode):
         self._flag_publisher.publish(Bool(data=self._flag))
         self._state_publisher.publish(String(data=self._state))
         self._reader = BlockReader()
-        self._subscription = self.create_subscription(
+        self._samples = Drained(
+            self,
             Float64MultiArray,
             'lathe/samples',
-            self._on_samples,
             QoSProfile(depth=_BACKLOG),
-            raw=True,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            QoSOverridingOptions.with_default_policies(),
         )
-        self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_REST, self._listen, clock=steady)
+        self.create_timer(1.0, self._report, clock=steady)
 
     # -- listening -------------------------------------------------------------------------
 
-    def _on_samples(self, data: bytes) -> None:
-        """Take this block and at once those that wait behind it."""
+    def _listen(self) -> None:
+        """Take the blocks that have come."""
         blocks: list[Array] = []
         names: tuple[str, ...] = ()
         count = 0
-        for serialised in self._waiting(data):
+        for serialised, _info in self._samples.take():
             try:
                 samples, columns = self._reader.read(serialised)
             except LatheChatterError as error:
@@ -115,17 +117,6 @@ class MonitorNode(ParameterNode):
                 blocks.append(samples)
                 count += len(samples)
         self._take_all(blocks, names)
-
-    def _waiting(self, first: bytes) -> Iterator[bytes]:
-        """A serialised message and those that have come since, but no more than may wait."""
-        yield first
-        handle = self._subscription.handle
-        for _ in range(_BACKLOG):
-            with handle:
-                found = handle.take_message(Float64MultiArray, True)  # noqa: FBT003 -- raw
-            if found is None:
-                return
-            yield found[0]
 
     def _take_all(self, blocks: list[Array], columns: tuple[str, ...]) -> None:
         """Take blocks together where they follow each other evenly, else one by one."""
@@ -288,7 +279,7 @@ def _even(times: Array) -> bool:
 
 def main() -> None:
     """Run the node until it is told to end."""
-    run_node(MonitorNode, by_events=False, rest=_REST)
+    run_node(MonitorNode, by_events=False)
 
 
 if __name__ == '__main__':

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from lathe_chatter.nodes.drained import Drained
 from lathe_chatter.recording import Topic
 from lathe_chatter.recording.numbering import Numbering
 
@@ -23,19 +23,6 @@ _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 Write = Callable[[str, bytes, int, int, int], None]
 """Takes topic, message, log time and publish time in ns, and the publisher's number."""
-
-
-class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type information
-    """Keeps subscriptions out of what the executor waits for."""
-
-    def can_execute(self, _entity: Any) -> bool:
-        return False
-
-    def beginning_execution(self, _entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, _entity: Any) -> None:
-        return
 
 
 class RecordedTopic:
@@ -66,7 +53,6 @@ class RecordedTopic:
         self._node = node
         self._write = write
         self._class = _message_class(topic.type)
-        self._group = _NeverReady()
         self._subscribe(_matching(offers))
 
     @property
@@ -85,32 +71,23 @@ class RecordedTopic:
         wanted = _matching(offers) if offers else self._qos
         if _asks_less(wanted, self._qos):
             self.drain()
-            self._node.destroy_subscription(self._subscription)
+            self._subscription.end()
             self._subscribe(wanted)
 
     def end(self) -> None:
         """Take what has arrived and was not yet served, and unsubscribe."""
         self.drain()
         self.numbering.settle(self._node.count_publishers(self.topic.name), math.inf)
-        self._node.destroy_subscription(self._subscription)
+        self._subscription.end()
 
     def _subscribe(self, qos: QoSProfile) -> None:
         self._qos = qos
-        self._subscription = self._node.create_subscription(
-            self._class,
-            self.topic.name,
-            _unused,
-            qos,
-            callback_group=self._group,
-            raw=True,
-        )
+        self._subscription = Drained(self._node, self._class, self.topic.name, qos)
 
     def drain(self) -> None:
         """Take everything that has arrived."""
-        handle = self._subscription.handle
-        with handle:
-            while (found := handle.take_message(self._class, True)) is not None:  # noqa: FBT003 -- raw
-                self._take(*found)
+        for data, info in self._subscription.take():
+            self._take(data, info)
 
     def _take(self, data: bytes, info: Mapping[str, Any]) -> None:
         number = info['publication_sequence_number'] or 0  # None where the middleware has none
@@ -120,10 +97,6 @@ class RecordedTopic:
         now = time.time_ns()
         log_time = info['received_timestamp'] or now
         self._write(self.topic.name, data, log_time, info['source_timestamp'] or now, number)
-
-
-def _unused(_data: bytes) -> None:
-    """Stands where rclpy wants a callback: messages are taken by `drain`."""
 
 
 def topic_of(name: str, offers: list[TopicEndpointInfo], types: Any) -> Topic | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import sys
 import time
@@ -16,9 +15,7 @@ from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import (
     Executor,
     ExternalShutdownException,
-    ShutdownException,
     SingleThreadedExecutor,
-    TimeoutException,
 )
 from rclpy.node import Node
 from rclpy.qos_overriding_options import InvalidQosOverridesError
@@ -80,7 +77,6 @@ def run_node(
     *,
     by_events: bool = True,
     spin: Spin[_Node] | None = None,
-    rest: float = 0.0,
 ) -> None:
     """Make a node and spin it until SIGINT, SIGTERM or a shutdown of its context.
 
@@ -91,7 +87,6 @@ def run_node(
         args: Command-line arguments, those of the process by default.
         by_events: Whether the executor may be the one driven by events; see `make_executor`.
         spin: How the node is served until it is told to end; by default as `serve` does.
-        rest: For `serve`.
 
     Raises:
         SystemExit: With 2 and a sentence on stderr if the node cannot start as it was asked to.
@@ -106,7 +101,7 @@ def run_node(
         if spin is not None:
             spin(executor, node, lambda: end.came)
         else:
-            serve(executor, node, lambda: end.came, rest=rest)
+            serve(executor, node, lambda: end.came)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except _START_ERRORS as error:
@@ -138,40 +133,21 @@ def _deliver(node: Node) -> None:
         publisher.wait_for_all_acked(Duration(seconds=left))
 
 
-def serve(executor: Executor, node: Node, ended: Callable[[], bool], *, rest: float = 0.0) -> None:
+def serve(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:
     """Serve a node until `ended` says so or its context is shut down.
 
     Args:
         executor: Calls the callbacks.
         node: Whose.
         ended: Looked at after each callback, and ten times a second while there is none.
-        rest: s to sleep once nothing is ready any more, where callbacks take all that has come
-            meanwhile: to be woken for every message costs more than the message. Only for an
-            executor of rclpy itself.
     """
     executor.add_node(node)
     try:
         while node.context.ok() and not ended():
-            if rest:
-                _serve_ready(executor)
-                time.sleep(rest)
-            else:
-                executor.spin_once(timeout_sec=LOOK_UP)
+            executor.spin_once(timeout_sec=LOOK_UP)
     finally:
         executor.remove_node(node)
         executor.shutdown()
-
-
-def _serve_ready(executor: Executor) -> None:
-    """Wait for something to do, and do all that is ready, for as long as a look-up at most."""
-    until = time.monotonic() + LOOK_UP
-    with contextlib.suppress(TimeoutException, ShutdownException):
-        timeout = LOOK_UP
-        while time.monotonic() < until:
-            task, _entity, _node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
-            task()
-            task.result()  # raises what the callback has raised
-            timeout = 0.0
 
 
 def make_executor(node: Node, *, by_events: bool = True) -> Executor:
