@@ -53,6 +53,11 @@ class ParameterSnapshots:
             self._node.create_client(GetParameters, f'{name}/get_parameters'),
         )
 
+    def want_again(self, name: str) -> None:
+        """Ask a node, by its full name, once more: another of its name has been started."""
+        if name not in self._wanted:
+            self._known.discard(name)
+
     def look(self) -> None:
         """Ask those that can answer by now, and have not."""
         now = time.monotonic()

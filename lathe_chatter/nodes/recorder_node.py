@@ -14,6 +14,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from rosbags.typesys import Stores, get_typestore
 from std_srvs.srv import Trigger
 
+from lathe_chatter.continuity import Joint
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.parameter_node import ParameterNode
@@ -31,6 +32,7 @@ from lathe_chatter.recording.identity import (
     RECEPTION,
     STALLS,
     identity,
+    parameter_values,
 )
 from lathe_chatter.recording.journal import Journal
 from lathe_chatter.recording.stalls import Stalls
@@ -127,7 +129,7 @@ class RecorderNode(ParameterNode):
         self._topics.clear()
         self._refused.clear()
         self._journal, self._stalls = Journal(), Stalls()
-        self._noted: dict[str, dict[str, Any]] = {}
+        self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
         self._most_publishers: dict[str, int] = {}
         self._snapshots = ParameterSnapshots(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
@@ -238,9 +240,9 @@ class RecorderNode(ParameterNode):
     def _note_parameters(self, node: str, parameters: dict[str, Any]) -> None:
         """Keep what another node was asked for, and when it answered."""
         if self._writer is not None:
-            values = {'parameters': json.dumps(parameters), 'log_time': str(time.time_ns())}
-            self._writer.note(PARAMETERS + node, values)
-            self._noted[node] = parameters
+            lives = self._noted.setdefault(node, [])
+            lives.append((parameters, time.time_ns()))
+            self._writer.note(PARAMETERS + node, parameter_values(lives))
 
     # -- what is done with it --------------------------------------------------------------
 
@@ -262,6 +264,9 @@ class RecorderNode(ParameterNode):
 
     def _tell(self) -> None:
         """Say from when there are samples, and where they are missing."""
+        for topic, heard in self._journal.samples.items():
+            if any(seam.joint is Joint.RESTART for seam in heard.seams):
+                self._snapshots.want_again(topic.removesuffix('/samples'))
         for sentence in news(self._journal):
             self.get_logger().info(sentence)
 

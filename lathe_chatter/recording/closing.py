@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from lathe_chatter.changes import Change
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe_parameters import cut_from, machine_from
 from lathe_chatter.model import BearingContact, Cut, Machine
@@ -17,13 +18,14 @@ SUMMARY = 'lathe_chatter/summary'
 
 
 def closing_summary(
-    journal: Journal, parameters: Mapping[str, Mapping[str, Any]]
+    journal: Journal, parameters: Mapping[str, Sequence[tuple[Mapping[str, Any], int]]]
 ) -> dict[str, str]:
     """What to note at the end of a run.
 
     Args:
         journal: Of the run.
-        parameters: Of lathes, by the full names of their nodes.
+        parameters: Of lathes, by the full names of their nodes: what each told, and when, ns
+            since the epoch.
     """
     values: dict[str, Any] = {
         'messages': dict(sorted(journal.messages.items())),
@@ -32,7 +34,7 @@ def closing_summary(
             {'time': time, 'topic': topic, 'flag': up} for time, topic, up in journal.flags
         ],
         'linear_model': {
-            topic: _verdicts(journal, topic, parameters.get(topic.removesuffix('/samples'), {}))
+            topic: _verdicts(journal, topic, parameters.get(topic.removesuffix('/samples'), ()))
             for topic in journal.samples
         },
     }
@@ -55,11 +57,25 @@ def _samples(heard: SamplesHeard) -> dict[str, Any]:
     }
 
 
-def _verdicts(journal: Journal, topic: str, parameters: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _verdicts(
+    journal: Journal, topic: str, told: Sequence[tuple[Mapping[str, Any], int]]
+) -> list[dict[str, Any]]:
     """Of each cut of a lathe, in order: what the linear model says of it."""
-    if not parameters:
-        return []
-    changes = journal.changes_of(topic.removesuffix('/samples'))
+    starts = journal.starts_of(topic.removesuffix('/samples'))
+    verdicts: list[dict[str, Any]] = []
+    for k, start in enumerate(starts):
+        since = start.begun if k else 0
+        until = starts[k + 1].begun if k + 1 < len(starts) else math.inf
+        parameters = next((values for values, at in told if since <= at < until), None)
+        if parameters is not None:
+            verdicts += _verdicts_since(parameters, start.changes)
+    return verdicts
+
+
+def _verdicts_since(
+    parameters: Mapping[str, Any], changes: Sequence[Change]
+) -> list[dict[str, Any]]:
+    """Of each cut since a start of a lathe."""
     try:
         machine, cut = machine_from(parameters), cut_from(parameters)
         for change in reversed(changes):  # the parameters may have been told after some

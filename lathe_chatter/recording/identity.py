@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import platform
 import sys
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from lathe_chatter import __version__
 
 IDENTITY = 'lathe_chatter/made_by'
 """Name of the MCAP metadata record in each file of a run."""
 PARAMETERS = 'lathe_chatter/parameters'
-"""Name of the records of a node's parameters, followed by its full name; values as JSON."""
+"""Name of the records of a node's parameters, followed by its full name; values as JSON.
+
+Of a node that was started again also those of its next lives, `parameters_2` and so on.
+"""
 
 RECEPTION = 'lathe_chatter/reception'
 """Name of the record of what came and what was lost on the way, by topic, as JSON."""
@@ -28,7 +34,6 @@ STALLS = 'stalls'
 
 RECOVERED = 'lathe_chatter/recovered'
 """Name of the record of a run that was recovered: from which, and what could not be read."""
-
 
 _CORE = ('integrator/*.py', 'compiled.py', 'lathe*.py', 'model.py')
 
@@ -60,3 +65,32 @@ def identity() -> dict[str, str]:
         'command': ' '.join(sys.argv),
         'started': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
     }
+
+
+def parameter_values(lives: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:
+    """The values of a record of parameters.
+
+    Args:
+        lives: The parameters of a node, and of the nodes of its name that came after it, each
+            with the time at which it told them, ns since the epoch.
+    """
+    values: dict[str, str] = {}
+    for k, (parameters, log_time) in enumerate(lives):
+        suffix = f'_{k + 1}' if k else ''
+        values[f'parameters{suffix}'] = json.dumps(dict(parameters))
+        values[f'log_time{suffix}'] = str(log_time)
+    return values
+
+
+def lives_in(values: Mapping[str, str]) -> Iterator[tuple[dict[str, Any], int]]:
+    """What `parameter_values` was given, as far as it is legible."""
+    for name, text in values.items():
+        if not name.startswith('parameters'):
+            continue
+        try:
+            parameters = json.loads(text)
+            log_time = int(values.get(name.replace('parameters', 'log_time'), '0'))
+        except ValueError:
+            continue
+        if isinstance(parameters, dict):
+            yield parameters, log_time

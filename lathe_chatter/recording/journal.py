@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.changes import Change, parse_change
+from lathe_chatter.changes import BEGINNING, Change, parse_change
 from lathe_chatter.continuity import Continuity, Joint
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE, Layout, layout_of
@@ -140,6 +140,19 @@ class SamplesHeard:
 
 
 @dataclass
+class Start:
+    """A lathe from one start of its process to the next.
+
+    Attributes:
+        begun: When it said so, ns since the epoch; 0 where it did not.
+        changes: Of its cut, in order.
+    """
+
+    begun: int = 0
+    changes: list[Change] = field(default_factory=list)
+
+
+@dataclass
 class Journal:
     """What happened so far.
 
@@ -147,13 +160,13 @@ class Journal:
         messages: By name of topic.
         samples: By name of topic.
         flags: Simulated time, topic and truth of each change of a monitor's flag.
-        changes: Of cuts, with the logger that told them.
+        starts: Of each logger that told of a cut: at least one.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
     samples: dict[str, SamplesHeard] = field(default_factory=dict)
     flags: list[tuple[float, str, bool]] = field(default_factory=list)
-    changes: list[tuple[str, Change]] = field(default_factory=list)
+    starts: dict[str, list[Start]] = field(default_factory=dict)
     _flag: dict[str, bool] = field(default_factory=dict)
 
     def hear(self, topic: str, kind: str, data: bytes, log_time: int, publish_time: int) -> None:
@@ -164,7 +177,7 @@ class Journal:
         elif kind == FLAG_TYPE and topic.endswith('/chatter') and len(data) > _FLAG_BYTE:
             self._hear_flag(topic, bool(data[_FLAG_BYTE]), log_time)
         elif kind == LOG_TYPE:
-            self._hear_log(data)
+            self._hear_log(data, publish_time)
 
     def _hear_flag(self, topic: str, up: bool, log_time: int) -> None:  # noqa: FBT001 -- it is one
         if up != self._flag.get(topic, False):
@@ -173,13 +186,19 @@ class Journal:
             time = of_the_lathe.time_at(log_time) if of_the_lathe else 0.0
             self.flags.append((time, topic, up))
 
-    def _hear_log(self, data: bytes) -> None:
+    def _hear_log(self, data: bytes, publish_time: int) -> None:
         message = types().deserialize_cdr(data, LOG_TYPE)
-        change = parse_change(message.msg)
+        change, begins = parse_change(message.msg), message.msg == BEGINNING
+        if change is None and not begins:
+            return
+        starts = self.starts.setdefault(message.name, [Start()])
         if change is not None:
-            self.changes.append((message.name, change))
+            starts[-1].changes.append(change)
+        elif starts[-1].begun or starts[-1].changes:
+            starts.append(Start(publish_time))
+        else:
+            starts[-1].begun = publish_time
 
-    def changes_of(self, lathe: str) -> list[Change]:
-        """The changes of the cut that a lathe, by the full name of its node, told."""
-        logger = lathe.lstrip('/').replace('/', '.')
-        return [change for name, change in self.changes if name == logger]
+    def starts_of(self, lathe: str) -> list[Start]:
+        """What a lathe, by the full name of its node, told; one where it told nothing."""
+        return self.starts.get(lathe.lstrip('/').replace('/', '.'), [Start()])

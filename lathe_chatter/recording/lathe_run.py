@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from lathe_chatter.model import Array
 from lathe_chatter.recording.closing import SUMMARY, closing_summary
-from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity
+from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.journal import Journal
 from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
 from lathe_chatter.recording.ros_messages import (
@@ -66,11 +65,10 @@ class LatheRun:
         self._sequences: dict[str, int] = {}
         self._committed = time.monotonic()
         self._closed = False
-        values = {'parameters': json.dumps(dict(parameters)), 'log_time': str(self._begun)}
         self._journal, self._parameters = Journal(), dict(parameters)
         self._kinds: dict[str, str] = {}
         self.writer.note(IDENTITY, identity())
-        self.writer.note(PARAMETERS + name, values)
+        self.writer.note(PARAMETERS + name, parameter_values([(parameters, self._begun)]))
         for topic, kind in (
             (self._samples, SAMPLES_TYPE),
             ('/rosout', LOG_TYPE),
@@ -123,7 +121,7 @@ class LatheRun:
         if self._closed:
             return
         self._closed = True
-        told = closing_summary(self._journal, {self.name: self._parameters})
+        told = closing_summary(self._journal, {self.name: [(self._parameters, self._begun)]})
         self.writer.note(SUMMARY, told)
         self.writer.close()
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from lathe_chatter.changes import BEGINNING_AGAIN, Change, Knock
 from lathe_chatter.errors import LatheChatterError, LayoutError, ParameterError
-from lathe_chatter.lathe_parameters import lathe_from
+from lathe_chatter.lathe_parameters import cut_from, lathe_from
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Integers
 from lathe_chatter.recording.identity import IDENTITY, core_identity
 from lathe_chatter.recording.reading.reader import Run, RunReadError
@@ -94,14 +94,19 @@ def _resimulated(run: Run, topic: str) -> Resimulation:
     told = told_by(run, topic.removesuffix('/samples'))
     try:
         replay = _Replay(told)
+    except (_CannotError, ParameterError) as error:
+        found.obstacle = str(error)
+        return found
+    try:
         for blocks in run.sample_blocks(topic):
             found.difference = replay.compare(blocks)
             if found.difference is not None:
                 break
-        found.compared = replay.compared
     except (_CannotError, ParameterError, LayoutError) as error:
         found.obstacle = str(error)
         return found
+    finally:
+        found.compared = replay.compared
     if found.difference is not None:
         found.obstacle = _excuse(run, replay)
     return found
@@ -174,6 +179,7 @@ class _Replay:
         self._told = told
         self._act = -1
         self._waiting: list[Change | Knock] = []
+        self._parameters = told.parameters
         self._lathe = lathe_from(told.parameters)
 
     def _begin(self, published: int) -> None:
@@ -187,6 +193,7 @@ class _Replay:
             cut = _after(cut, happened)
         self._act += 1
         while self._act + 1 < len(acts) and acts[self._act + 1].begun <= published:
+            cut = self._started(cut)
             for happened in acts[self._act].happenings:
                 cut = _after(cut, happened)
             self._act += 1
@@ -194,14 +201,23 @@ class _Replay:
             raise _CannotError(
                 'Simulated time goes back, and the record does not say how the lathe began again.'
             )
-        if self._act and acts[self._act].beginning != BEGINNING_AGAIN:
+        cut = self._started(cut)
+        values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
+        self._lathe = lathe_from({**self._parameters, **values})
+        self.whole = bool(acts[self._act].beginning)
+        self._waiting = list(acts[self._act].happenings)
+
+    def _started(self, cut: Cut) -> Cut:
+        """The cut at time zero of the present act: as it was, or of a lathe started again."""
+        act = self._told.acts[self._act]
+        if not self._act or act.beginning == BEGINNING_AGAIN:
+            return cut
+        if not act.parameters:
             raise _CannotError(
                 'The lathe was started a second time, and with what parameters is not recorded.'
             )
-        values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
-        self._lathe = lathe_from({**self._told.parameters, **values})
-        self.whole = bool(acts[self._act].beginning)
-        self._waiting = list(acts[self._act].happenings)
+        self._parameters = act.parameters
+        return cut_from(act.parameters)
 
     def compare(self, blocks: Blocks) -> Difference | None:
         """Compare the blocks of some messages with what the lathe does; the first difference."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from lathe_chatter.changes import (
@@ -15,10 +15,12 @@ from lathe_chatter.changes import (
     parse_change,
     parse_knock,
 )
-from lathe_chatter.recording.identity import PARAMETERS
+from lathe_chatter.recording.identity import PARAMETERS, lives_in
 from lathe_chatter.recording.reading.reader import Run
 
 _KINDS = {1: 'bool_value', 2: 'integer_value', 3: 'double_value', 4: 'string_value'}
+_END = 2**63
+"""ns since the epoch: no message is as late."""
 
 
 @dataclass
@@ -29,10 +31,13 @@ class Act:
         beginning: The sentence of its time zero, empty where the record has none.
         begun: When that was published, ns since the epoch.
         happenings: Changes and knocks in the order in which they took effect.
+        parameters: With which the lathe was started for this act, by name; empty where nobody
+            was told, or it was not started but reset.
     """
 
     beginning: str = ''
     begun: int = 0
+    parameters: dict[str, Any] = field(default_factory=dict)
     happenings: list[Change | Knock] = field(default_factory=list)
 
 
@@ -41,12 +46,15 @@ class Told:
     """What a lathe told.
 
     Attributes:
-        parameters: At its start, by name; empty where nobody was told.
         acts: One, and another for each reset and each new start.
     """
 
-    parameters: dict[str, Any]
     acts: tuple[Act, ...]
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """At its first start, by name; empty where nobody was told."""
+        return self.acts[0].parameters
 
     @property
     def logged(self) -> bool:
@@ -67,7 +75,14 @@ def told_by(run: Run, lathe: str) -> Told:
         RunReadError: If a file is damaged.
     """
     acts = tuple(_acts(run, lathe))
-    return Told(_parameters(run, lathe, acts), acts)
+    starts = [k for k, act in enumerate(acts) if not k or act.beginning == BEGINNING]
+    for first, after in pairwise([*starts, len(acts)]):
+        span = (
+            acts[first].begun if first else 0,
+            acts[after].begun if after < len(acts) else _END,
+        )
+        acts[first].parameters = _parameters(run, lathe, acts[first:after], span)
+    return Told(acts)
 
 
 def _acts(run: Run, lathe: str) -> list[Act]:
@@ -88,11 +103,18 @@ def _acts(run: Run, lathe: str) -> list[Act]:
     return acts
 
 
-def _parameters(run: Run, lathe: str, acts: Sequence[Act]) -> dict[str, Any]:
-    """The parameters at the start: as the lathe was asked for them, or announced them itself."""
-    found = _noted(run, lathe) or {}
-    announced = _announced(run, lathe)
-    found = {**found, **announced}
+def _parameters(
+    run: Run, lathe: str, acts: Sequence[Act], span: tuple[int, int]
+) -> dict[str, Any]:
+    """The parameters at a start: as the lathe was asked for them, or announced them itself.
+
+    Args:
+        run: Which.
+        lathe: The full name of its node.
+        acts: From this start to the next.
+        span: When they were, ns since the epoch.
+    """
+    found = {**_noted(run, lathe, span), **_announced(run, lathe, span)}
     # It was asked when it had been cutting for a while, and may have been told late: what the
     # first change of a value replaced is what it was at the start.
     first: dict[str, Any] = {}
@@ -104,23 +126,21 @@ def _parameters(run: Run, lathe: str, acts: Sequence[Act]) -> dict[str, Any]:
     return {**found, **plain} if found else {}
 
 
-def _noted(run: Run, lathe: str) -> dict[str, Any] | None:
+def _noted(run: Run, lathe: str, span: tuple[int, int]) -> dict[str, Any]:
+    """As it was asked for them."""
     for note in run.notes():
         if note.name == PARAMETERS + lathe:
-            try:
-                values = json.loads(note.values['parameters'])
-            except (KeyError, ValueError):
-                continue
-            if isinstance(values, dict):
-                return values
-    return None
+            for values, log_time in lives_in(note.values):
+                if span[0] <= log_time < span[1]:
+                    return values
+    return {}
 
 
-def _announced(run: Run, lathe: str) -> dict[str, Any]:
+def _announced(run: Run, lathe: str, span: tuple[int, int]) -> dict[str, Any]:
     """As it declared them; what is set later is no declaration."""
     found: dict[str, Any] = {}
     for recorded in run.messages('/parameter_events'):
-        if recorded.message.node == lathe:
+        if recorded.message.node == lathe and span[0] <= recorded.publish_time < span[1]:
             for parameter in recorded.message.new_parameters:
                 if parameter.value.type in _KINDS:
                     found[parameter.name] = getattr(parameter.value, _KINDS[parameter.value.type])

@@ -16,8 +16,9 @@ from bench import LATCHED, Bench
 from node_processes import NodeProcesses, Reports, Samples, contiguous
 from std_msgs.msg import Bool, String
 
-from lathe_chatter.recording import read_run, verify
+from lathe_chatter.recording import read_run, resimulate, verify
 from lathe_chatter.recording.closing import SUMMARY
+from lathe_chatter.recording.identity import PARAMETERS, lives_in
 
 CHATTER = ('depth_of_cut:=0.001', 'bearing_contact:=none')
 HEARD = '/chatter_monitor: samples'
@@ -77,6 +78,12 @@ def cell(bench: Bench, nodes: NodeProcesses) -> Cell:
 def test_a_killed_lathe_is_missed_and_the_next_one_followed(cell: Cell) -> None:
     cell.start()
     reports = cell.reports
+
+    def lives() -> list[Any]:
+        """The lathes of whose parameters the run knows."""
+        return [*lives_in(noted(cell.run(), f'{PARAMETERS}/lathe'))]
+
+    cell.wait(lives, 'the parameters')
     since, known = reports.count(), len(cell.states)
     cell.nodes.kill('/lathe')
     cell.wait(lambda: cell.states[-1].data == 'unknown', 'silence noticed')
@@ -106,16 +113,22 @@ def test_a_killed_lathe_is_missed_and_the_next_one_followed(cell: Cell) -> None:
     assert float(again[1]) == pytest.approx(end, abs=1e-6)
     assert float(again[2]) < end
 
+    cell.wait(lambda: len(lives()) == 2, 'the parameters of the next one')
     cell.nodes.interrupt('/run_recorder')
     run = read_run(cell.run())
     first, second = np.split(times := recorded(run), np.flatnonzero(np.diff(times) < 0.0) + 1)
     assert contiguous(first)
     assert first[-1] >= end - 1e-9
     assert contiguous(second)
-    (counted,) = [json.loads(n.values['samples']) for n in run.notes() if n.name == SUMMARY]
+    counted = json.loads(noted(cell.run(), SUMMARY)['samples'])
     assert counted['/lathe/samples']['restarts'] == 1
     found = [finding.text for finding in verify(cell.run()).findings]
     assert any('simulated time goes back' in text for text in found), found
+    (computed,) = resimulate(run)
+    assert computed.proven, computed.obstacle
+    assert computed.compared == times.size
+    told = json.loads(noted(cell.run(), SUMMARY)['linear_model'])['/lathe/samples']
+    assert [cut['spindle_speed_rpm'] for cut in told] == [3000.0, 6000.0]
     since = f'from {second[0]:.6f} s on, after the lathe started again at {first[-1]:.6f} s'
     assert any(f'/lathe/samples is recorded {since}' in sentence for sentence in logged(run))
 
@@ -134,7 +147,7 @@ def test_a_killed_monitor_comes_back_and_says_from_when_it_listens(cell: Cell) -
 
     cell.nodes.start('chatter_monitor')
     cell.wait_for_a_state(states)
-    cell.wait(lambda: [f.data for f in cell.flags[flags:]] == [False, True], 'the flag again')
+    cell.wait(lambda: any(flag.data for flag in cell.flags[flags:]), 'the flag again')
     cell.wait(lambda: len(listening(reports)) == 2, 'from when it listens')
     told = float(listening(reports)[1])
     assert told > end
@@ -165,7 +178,7 @@ def test_a_killed_recorder_leaves_a_run_and_the_next_says_what_it_missed(cell: C
     after = recorded(run)
     assert after[0] > before[-1]
     missed = round(after[0] * 1e4) - 1
-    (counted,) = [json.loads(n.values['samples']) for n in run.notes() if n.name == SUMMARY]
+    counted = json.loads(noted(cell.run(), SUMMARY)['samples'])
     heard = counted['/lathe/samples']
     assert (heard['head'], heard['samples']) == (missed, after.size)
     # Of what the lathe keeps some may be gone before it is sent: that is counted too.
@@ -189,6 +202,11 @@ def listening(reports: Reports) -> list[str]:
     """From when the monitor said that it listens, s."""
     found = map(LISTENING.fullmatch, reports.sentences('chatter_monitor'))
     return [match[1] for match in found if match]
+
+
+def noted(run: Path, name: str) -> dict[str, str]:
+    """The latest note of a name in a run, which opens also while it is being recorded."""
+    return {note.name: note.values for note in read_run(run).notes()}.get(name, {})
 
 
 def recorded(run: Any) -> Any:

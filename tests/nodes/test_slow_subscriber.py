@@ -80,15 +80,15 @@ def test_a_process_that_is_stopped_slows_nothing_and_says_what_it_missed(
 def follow(
     bench: Bench, reports: Reports, samples: Samples, blocks: int, *, factor: float
 ) -> None:
-    """Hear so many more blocks, of which nothing is lost and next to nothing given up."""
+    """Hear so many more blocks: nothing is lost, and the lathe waits for nobody."""
     before = pace(bench, reports)
     target = len(samples) + blocks
     bench.spin_until(lambda: len(samples) >= target, 'more samples than anybody keeps')
     after = pace(bench, reports)
     cut = (after['ticks'] - before['ticks']) * TICK / factor
-    # What the machine has no time for is given up too; but a reader that the lathe waits for
-    # would cost nearly all.
-    assert after['lag given up, s'] - before['lag given up, s'] < 0.5 * cut
+    # What the machine has no time for is given up too. But a writer that waits for a reader does
+    # so for 0.1 s: 49 of 50 ticks would be given up at least.
+    assert after['lag given up, s'] - before['lag given up, s'] < 9.0 * cut
     (times,) = samples.runs()
     assert contiguous(times)
 

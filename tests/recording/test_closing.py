@@ -11,11 +11,12 @@ import pytest
 from lathe_chatter.changes import BEGINNING, change_sentence
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe_parameters import parameters_of
+from lathe_chatter.model import Cut
 from lathe_chatter.recording import LatheRun, read_run
-from lathe_chatter.recording.closing import SUMMARY
+from lathe_chatter.recording.closing import SUMMARY, closing_summary
 from lathe_chatter.recording.journal import Journal
 from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
-from lathe_chatter.recording.ros_messages import samples_bytes
+from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, samples_bytes
 
 TICK = 2_000_000
 
@@ -51,6 +52,24 @@ def test_counts_samples_flags_and_the_linear_models_verdict_are_in_the_run(tmp_p
     assert before['seated']['growth_rate'] == pytest.approx(1.708234, abs=1e-6)
     assert after['open']['growth_rate'] == pytest.approx(13.652715, abs=1e-6)
     assert (before['open']['stable'], after['open']['stable']) == (True, False)
+
+
+def test_a_lathe_that_was_started_again_is_judged_by_its_own_parameters() -> None:
+    journal = Journal()
+    told = [(parameters_of(VirtualLathe()), 2), (parameters_of(VirtualLathe(cut=Cut(7000.0))), 12)]
+    deeper = Cut(7000.0, 0.001)
+    for at, sentence in (
+        (1, BEGINNING),
+        (11, BEGINNING),
+        (13, change_sentence(0.5, Cut(7000.0), deeper)),
+    ):
+        data = log_bytes('lathe', sentence, at)
+        journal.hear('/rosout', LOG_TYPE, data, at, at)
+    heard(journal, VirtualLathe(), at=14)
+    values = closing_summary(journal, {'/lathe': told})
+    verdicts = json.loads(values['linear_model'])['/lathe/samples']
+    cuts = [(v['time'], v['spindle_speed_rpm'], v['depth_of_cut']) for v in verdicts]
+    assert cuts == [(0.0, 3000.0, 0.0005), (0.0, 7000.0, 0.0005), (0.5, 7000.0, 0.001)]
 
 
 def heard(journal: Journal, lathe: VirtualLathe, *, at: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe_parameters import lathe_from, parameters_of
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine, Mode
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
-from lathe_chatter.recording.identity import IDENTITY, identity
+from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity, parameter_values
 
 TICK = 20
 Alter = Callable[[int, Array], Array]
@@ -143,6 +144,33 @@ def test_a_reset_begins_again(tmp_path: Path) -> None:
         lathe = lathe_from({**parameters, 'depth_of_cut': 0.0008})
         run.take(lathe.advance(300))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=700)
+
+
+@pytest.mark.parametrize('asked', [True, False])
+def test_a_lathe_that_was_started_again_is_computed_with_its_own_parameters(
+    asked: bool, tmp_path: Path
+) -> None:
+    first = VirtualLathe(cut=Cut(force_noise=1e-3), seed=3)
+    second = VirtualLathe(Machine(Mode(0.06, 700.0, 0.03)), Cut(7000.0, 0.0007), seed=4)
+    deeper = second.cut.with_changes(depth_of_cut=0.0008)
+    with LatheRun(tmp_path / 'run', parameters_of(first)) as run:
+        run.tell(BEGINNING)
+        run.take(first.advance(400))
+        told = [(parameters_of(first), time.time_ns())]
+        run.tell(BEGINNING)  # killed, and started with other words
+        run.take(second.advance(200))
+        run.tell(change_sentence(second.time, second.cut, deeper))
+        second.retune(deeper)
+        run.take(second.advance(100))
+        if asked:
+            told.append((parameters_of(second), time.time_ns()))
+        run.writer.note(f'{PARAMETERS}/lathe', parameter_values(told))
+    found = again(tmp_path / 'run')
+    if asked:
+        assert found == Resimulation('/lathe/samples', compared=700)
+    else:
+        assert found.compared == 400
+        assert 'with what parameters is not recorded' in found.obstacle
 
 
 def test_a_run_of_other_software_is_not_called_altered(tmp_path: Path) -> None:
