@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from lathe_chatter.model import Machine
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.quantities import limits_of
 from lathe_chatter.stability import recommend_speeds, rightmost_root
 
 _CANDIDATES = 8
@@ -96,6 +97,8 @@ def advise(
     if not (cutting_stiffness > 0.0 and machine.cutting_coefficient > 0.0):
         return Advice()
     depth = cutting_stiffness / machine.cutting_coefficient
+    if depth > limits_of(Cut, 'depth_of_cut').high:
+        return Advice()  # C, or what was identified, is not to be believed
     low, high = speed_range
     near = max(low, current_rpm / _NEAR), min(high, current_rpm * _NEAR)
     both = (False, True)

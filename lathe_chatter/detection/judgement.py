@@ -202,8 +202,9 @@ def _saturated(ledger: Ledger, products: Array, newest: int, strongest: int, sti
 def _decide(ledger: Ledger, strongest_amplitude: float) -> None:
     """Raise the alarm, or clear it."""
     numbers, flags = ledger.numbers, ledger.flags
-    alarm = numbers[SCORE] >= numbers[STRICTNESS] and strongest_amplitude > numbers[SMALLEST]
-    alarm = alarm or flags[SATURATED] >= _SATURATED
+    alarm = numbers[SCORE] >= numbers[STRICTNESS] or flags[SATURATED] >= _SATURATED
+    # What is left of a cut that has settled are roundings, and these repeat themselves.
+    alarm = alarm and strongest_amplitude > numbers[SMALLEST]
     flags[SUSPECTED] = flags[SUSPECTED] + 1 if alarm else 0
     if flags[ALARMED] == 0:
         if flags[SUSPECTED] >= 1:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.detection.advice import Advice
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine
@@ -319,3 +320,23 @@ def test_what_is_identified_agrees_with_the_cut() -> None:
         assert known.bearing_engaged is seated
         assert known.waves_per_revolution == pytest.approx(known.frequency / 50.0)
         assert known.doubling_time == pytest.approx(np.log(2.0) / known.growth_rate)
+
+
+@pytest.mark.parametrize('begins', [1.0, 4.172, 5.64, 7.59, 10.734])
+def test_who_joins_a_cut_that_has_settled_hears_no_chatter_in_its_roundings(begins: float) -> None:
+    lathe = VirtualLathe()
+    lathe.advance(round(begins * 1e4))
+    detector = ChatterDetector()
+    for _ in range(300):
+        estimate = detector.update(lathe.advance(100), SAMPLE_COLUMNS)
+        assert not estimate.chatter
+    assert estimate.state == 'stable'
+
+
+def test_with_a_cutting_coefficient_that_cannot_be_there_is_an_alarm_and_no_advice() -> None:
+    machine = Machine(cutting_coefficient=1e4)  # a depth of 0.35 m would follow
+    detector = ChatterDetector(machine)
+    samples = VirtualLathe(cut=Cut(depth_of_cut=0.001, bearing_contact='none')).advance(20_000)
+    estimate = detector.update(samples, SAMPLE_COLUMNS)
+    assert estimate.chatter
+    assert estimate.advice == Advice()
