@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,14 +29,17 @@ from lathe_chatter.nodes.overrides import publisher_overrides
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.running import run_node
+from lathe_chatter.nodes.tick_loop import spin_in_ticks
 from lathe_chatter.warm_up import warm_up
 
 _BACKLOG = 2000
 """Blocks of samples that may wait for the monitor: 4 s of a lathe of 500 ticks a second."""
 _AT_ONCE = 200
 """Samples that the detector gets at once, if they wait: 20 ms of a lathe of 10 kHz."""
-_REST = 0.01
-"""s that the node lets samples come in before it looks at them together."""
+_REST = 20_000_000
+"""ns that the node lets samples come in before it looks at them together."""
+_SERVE_PERIOD = 100_000_000
+"""ns from one look for requests to the next: a look costs more than the samples of a rest."""
 _REPORT_PERIOD = 0.02
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
 _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
@@ -51,13 +56,15 @@ class MonitorNode(ParameterNode):
     Where no samples come the state is unknown, and the flag stays as it was.
 
     Args:
+        by_timer: Whether a timer lets it look at the samples, so that any executor will do; else
+            its loop calls `wake` (tick_loop.py).
         options: As for `rclpy.node.Node`.
 
     Raises:
         ParameterError: If a parameter given at the start is not allowed.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, by_timer: bool = True, **options: Any) -> None:
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
         warm_up()  # compiled before the first sample comes
@@ -94,13 +101,23 @@ class MonitorNode(ParameterNode):
             QoSOverridingOptions.with_default_policies(),
         )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_REST, self._listen, clock=steady)
+        self._wake_at = time.monotonic_ns()
+        if by_timer:
+            self.create_timer(_REST / 1e9, self.wake, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
 
     # -- listening -------------------------------------------------------------------------
 
-    def _listen(self) -> None:
+    def next_wake(self) -> int:
+        """When it looks at its samples next, ns of time.monotonic_ns()."""
+        return self._wake_at
+
+    def keep_place(self) -> None:
+        """It needs no place of its own in the scheduling: late is not wrong."""
+
+    def wake(self) -> None:
         """Take the blocks that have come."""
+        self._wake_at = time.monotonic_ns() + _REST
         blocks: list[Array] = []
         names: tuple[str, ...] = ()
         count = 0
@@ -279,7 +296,9 @@ def _even(times: Array) -> bool:
 
 def main() -> None:
     """Run the node until it is told to end."""
-    run_node(MonitorNode, by_events=False)
+    # The executor driven by events would take the samples away.
+    spin = partial(spin_in_ticks, serve_period=_SERVE_PERIOD)
+    run_node(lambda: MonitorNode(by_timer=False), by_events=False, spin=spin)
 
 
 if __name__ == '__main__':

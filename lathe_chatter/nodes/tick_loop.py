@@ -16,7 +16,7 @@ from rclpy.executors import Executor
 
 from lathe_chatter.nodes.running import LOOK_UP
 
-_SERVE_PERIOD = 10_000_000
+SERVE_PERIOD = 10_000_000
 """ns after which the executor looks for requests that nobody knows of."""
 _MARGIN = 500_000
 """ns before the next tick in which the executor is not asked any more: it may come back late."""
@@ -38,13 +38,19 @@ class Woken(Protocol):
         """Look after the scheduling of this thread, from time to time."""
 
 
-def spin_in_ticks(executor: Executor, node: Woken, ended: Callable[[], bool]) -> None:
+def spin_in_ticks(
+    executor: Executor,
+    node: Woken,
+    ended: Callable[[], bool],
+    serve_period: int = SERVE_PERIOD,
+) -> None:
     """Wake and serve a node until `ended` says so or its context is shut down.
 
     Args:
         executor: Serves its requests.
         node: Which; its times come first.
         ended: Looked at after each tick, and ten times a second while there is none.
+        serve_period: ns after which the executor looks for requests that nobody knows of.
     """
     executor.add_node(node)
     serve_at = 0
@@ -57,7 +63,7 @@ def spin_in_ticks(executor: Executor, node: Woken, ended: Callable[[], bool]) ->
             now = time.monotonic_ns()
             if now >= serve_at:
                 busy = _serve(executor, now, wake_at - _MARGIN)
-                serve_at = 0 if busy else now + _SERVE_PERIOD
+                serve_at = 0 if busy else now + serve_period
                 node.keep_place()
             left = wake_at - time.monotonic_ns()
             if left > 0:
