@@ -76,12 +76,12 @@ def told_by(run: Run, lathe: str) -> Told:
     """
     acts = tuple(_acts(run, lathe))
     starts = [k for k, act in enumerate(acts) if not k or act.beginning == BEGINNING]
+    announced = _announced(run, lathe, acts[0].begun if len(starts) > 1 else _END)
     for first, after in pairwise([*starts, len(acts)]):
-        span = (
-            acts[first].begun if first else 0,
-            acts[after].begun if after < len(acts) else _END,
-        )
-        acts[first].parameters = _parameters(run, lathe, acts[first:after], span)
+        since = acts[first].begun if first else 0
+        until = acts[after].begun if after < len(acts) else _END
+        found = {**_noted(run, lathe, since, until), **({} if first else announced)}
+        acts[first].parameters = _at_the_start(found, acts[first:after])
     return Told(acts)
 
 
@@ -103,20 +103,12 @@ def _acts(run: Run, lathe: str) -> list[Act]:
     return acts
 
 
-def _parameters(
-    run: Run, lathe: str, acts: Sequence[Act], span: tuple[int, int]
-) -> dict[str, Any]:
-    """The parameters at a start: as the lathe was asked for them, or announced them itself.
+def _at_the_start(found: dict[str, Any], acts: Sequence[Act]) -> dict[str, Any]:
+    """The parameters at a start, from those of some time before the next; empty where none.
 
-    Args:
-        run: Which.
-        lathe: The full name of its node.
-        acts: From this start to the next.
-        span: When they were, ns since the epoch.
+    The lathe was asked when it had been cutting for a while, and may have been told late: what
+    the first change of a value replaced is what it was at the start.
     """
-    found = {**_noted(run, lathe, span), **_announced(run, lathe, span)}
-    # It was asked when it had been cutting for a while, and may have been told late: what the
-    # first change of a value replaced is what it was at the start.
     first: dict[str, Any] = {}
     for act in acts:
         for each in act.happenings:
@@ -126,21 +118,28 @@ def _parameters(
     return {**found, **plain} if found else {}
 
 
-def _noted(run: Run, lathe: str, span: tuple[int, int]) -> dict[str, Any]:
-    """As it was asked for them."""
+def _noted(run: Run, lathe: str, since: int, until: int) -> dict[str, Any]:
+    """As it was asked for them between two times, ns since the epoch."""
     for note in run.notes():
         if note.name == PARAMETERS + lathe:
             for values, log_time in lives_in(note.values):
-                if span[0] <= log_time < span[1]:
+                if since <= log_time < until:
                     return values
     return {}
 
 
-def _announced(run: Run, lathe: str, span: tuple[int, int]) -> dict[str, Any]:
-    """As it declared them; what is set later is no declaration."""
+def _announced(run: Run, lathe: str, until: int) -> dict[str, Any]:
+    """As it declared them; what is set later is no declaration.
+
+    Args:
+        run: Which.
+        lathe: The full name of its node.
+        until: When it began, ns since the epoch, if another of its name followed: that one
+            declares its own before it says that it begins.
+    """
     found: dict[str, Any] = {}
     for recorded in run.messages('/parameter_events'):
-        if recorded.message.node == lathe and span[0] <= recorded.publish_time < span[1]:
+        if recorded.message.node == lathe and recorded.publish_time <= until:
             for parameter in recorded.message.new_parameters:
                 if parameter.value.type in _KINDS:
                     found[parameter.name] = getattr(parameter.value, _KINDS[parameter.value.type])

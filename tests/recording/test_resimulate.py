@@ -16,6 +16,7 @@ from lathe_chatter.lathe_parameters import lathe_from, parameters_of
 from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine, Mode
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
 from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity, parameter_values
+from lathe_chatter.recording.ros_messages import parameters_bytes
 
 TICK = 20
 Alter = Callable[[int, Array], Array]
@@ -157,7 +158,10 @@ def test_a_lathe_that_was_started_again_is_computed_with_its_own_parameters(
         run.tell(BEGINNING)
         run.take(first.advance(400))
         told = [(parameters_of(first), time.time_ns())]
-        run.tell(BEGINNING)  # killed, and started with other words
+        # It is killed, and started with other words: it declares before it begins.
+        declared = parameters_bytes('/lathe', parameters_of(second), time.time_ns())
+        run._write('/parameter_events', declared)
+        run.tell(BEGINNING)
         run.take(second.advance(200))
         run.tell(change_sentence(second.time, second.cut, deeper))
         second.retune(deeper)
