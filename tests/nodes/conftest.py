@@ -23,7 +23,8 @@ from rclpy.parameter import Parameter
 
 from lathe_chatter.warm_up import warm_up
 
-PATIENCE = 60.0
+PATIENCE = 120.0
+"""s: the start of a node takes 20 s where others keep the machine busy."""
 SpinUntil = Callable[..., None]
 
 
