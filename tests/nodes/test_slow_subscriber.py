@@ -48,8 +48,8 @@ def test_readers_that_do_not_read_slow_nothing_and_cost_nobody_a_sample(
     latched = DurabilityPolicy.TRANSIENT_LOCAL
     stuck(QoSProfile(depth=KEPT, reliability=reliable, durability=latched))
     # Nobody is served before all are there.
-    nodes.start('lathe', 'real_time_factor:=3.0', 'await_readers:=4')
-    follow(bench, reports, samples, KEPT + REFUSED, factor=3.0)
+    nodes.start('lathe', 'real_time_factor:=1.5', 'await_readers:=4')
+    follow(bench, reports, samples, KEPT + REFUSED, factor=1.5)
     (times,) = samples.runs()
     assert times[0] == 1e-4
 
