@@ -91,7 +91,7 @@ class Cell:
                 process.wait()
                 complaints.append(f'{name} did not end within {_PATIENCE:.0f} s and was killed.')
             else:
-                if process.returncode not in _ENDED_WELL:
+                if process.returncode not in _ENDED_WELL and not _interrupted(output):
                     complaints.append(_last_words(name, process.returncode, output))
             output.close()
         return complaints
@@ -110,11 +110,20 @@ class Cell:
         self.end()
 
 
+def _interrupted(output: IO[bytes]) -> bool:
+    """Whether a node was told to end while a library was being imported that exits with 1 then."""
+    return _last_line(output) == KeyboardInterrupt.__name__
+
+
+def _last_line(output: IO[bytes]) -> str:
+    output.seek(0)
+    lines = output.read().decode(errors='replace').split('\n')
+    return next((line.strip() for line in reversed(lines) if line.strip()), '')
+
+
 def _last_words(name: str, code: int, output: IO[bytes]) -> str:
     """What a node said last, as the reason for its end, unless it was killed."""
     if code < 0:
         return f'{name} was ended by the signal {signal.Signals(-code).name}.'
-    output.seek(0)
-    lines = output.read().decode(errors='replace').split('\n')
-    words = next((line.strip() for line in reversed(lines) if line.strip()), 'it said nothing')
+    words = _last_line(output) or 'it said nothing'
     return f'{name} ended with exit code {code}: {words}'

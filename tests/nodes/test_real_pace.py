@@ -20,7 +20,9 @@ def test_simulated_time_follows_the_clock_at_the_factor_asked_for(
     reports = Reports(bench)
     heard = {factor: Samples(bench, f'/{name(factor)}/lathe/samples') for factor in FACTORS}
     for factor in FACTORS:
-        nodes.start('lathe', f'real_time_factor:={factor}', namespace=f'/{name(factor)}')
+        space = f'/{name(factor)}'
+        deep = f'qos_overrides.{space}/lathe/samples.publisher.depth:=10000'
+        nodes.start('lathe', f'real_time_factor:={factor}', deep, namespace=space)
     # The beginning is not looked at: all of them are starting then.
     for factor, samples in heard.items():
         bench.spin_until(lambda samples=samples: len(samples) > 100, f'samples at {factor}')
