@@ -192,7 +192,9 @@ class LatheNode(ParameterNode):
 
     def destroy_node(self) -> None:
         """Finish its own record before the node goes."""
-        self._record.close()
+        record: LatheRecord | None = getattr(self, '_record', None)
+        if record is not None:  # Kilted destroys nodes, too, that were refused half-made
+            record.close()
         super().destroy_node()
 
     # -- the cut ---------------------------------------------------------------------------

@@ -175,7 +175,8 @@ class RecorderNode(ParameterNode):
             RecordingFailedError: If its end is not on disk.
         """
         failed = False
-        if self._writer is not None:
+        # Kilted destroys nodes, too, that were refused half-made.
+        if getattr(self, '_writer', None) is not None:
             said = self.stop()
             failed = bool(self._failure)
             (self.get_logger().error if failed else self.get_logger().info)(said)

@@ -24,6 +24,7 @@ class Bench:
         self.node = Node('bench', context=context)
         self.executor = executor
         self.spin_until = spin
+        self._clients: dict[str, Any] = {}
         executor.add_node(self.node)
 
     def listen(self, kind: Any, topic: str, qos: QoSProfile = DEEP) -> list[Any]:
@@ -53,11 +54,12 @@ class Bench:
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
         """The answer of a service."""
-        client = self.node.create_client(kind, service)
+        # Kept: a server may not have found a new client yet when it answers, and DDS drops that.
+        client = self._clients.get(service) or self.node.create_client(kind, service)
+        self._clients[service] = client
         self.spin_until(client.service_is_ready, service)
         future = client.call_async(request)
         self.spin_until(future.done, f'an answer of {service}')
-        self.node.destroy_client(client)
         return future.result()
 
     def trigger(self, service: str) -> Any:
