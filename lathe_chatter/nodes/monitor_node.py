@@ -34,13 +34,13 @@ from lathe_chatter.warm_up import warm_up
 
 _BACKLOG = 2000
 """Blocks of samples that may wait for the monitor: 4 s of a lathe of 500 ticks a second."""
-_AT_ONCE = 200
-"""Samples that the detector gets at once, if they wait: 20 ms of a lathe of 10 kHz."""
+_AT_ONCE = 400
+"""Samples that the detector gets at once, if they wait: 40 ms of a lathe of 10 kHz."""
 _REST = 20_000_000
 """ns that the node lets samples come in before it looks at them together."""
 _SERVE_PERIOD = 100_000_000
 """ns from one look for requests to the next: a look costs more than the samples of a rest."""
-_REPORT_PERIOD = 0.02
+_REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
 _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
