@@ -1,11 +1,12 @@
 """The nodes' figures on this machine: CPU, lateness of the ticks, delay of a parameter.
 
-    python benchmarks/nodes.py [--seconds 60] [cpu] [lateness] [parameter] [lathes] [hour]
+    python benchmarks/nodes.py [--seconds 60] [cpu] [lateness] [parameter] [lathes]
+    python benchmarks/nodes.py [--simulated 3600] hour
 
 Everything is measured from outside, on the real nodes over real DDS: CPU from the kernel's
 accounts of the processes, lateness from the time at which DDS was handed each block of samples,
-losses from the times in the payload. Lateness is counted from the earliest tick of the whole
-run, so that nothing is flattered.
+losses from the times in the payload. Lateness is counted from the earliest in a hundred ticks:
+the tick after one that came late may be made up to half a period early, which is told too.
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ LATHE = 'lathe_chatter.nodes.lathe_node'
 MONITOR = 'lathe_chatter.nodes.monitor_node'
 RECORDER = 'lathe_chatter.nodes.recorder_node'
 TICK = 0.002
+_IN_TIME = 0.01
+"""Part of the ticks that are no later than their time."""
 DEEP = QoSProfile(depth=5000)
 KEPT = QoSProfile(depth=5000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -202,12 +205,13 @@ def measure_lateness(seconds: float) -> None:
             listener.spin(limit=seconds)
         sent = np.array(listener.sent[begin:], dtype=np.int64)
         late = (sent - sent[0]) / 1e9 - TICK * np.arange(sent.size)
-        late = (late - late.min()) * 1e3
+        late = (late - np.quantile(late, _IN_TIME)) * 1e3
         p50, p99, largest = np.quantile(late, [0.5, 0.99, 1.0])
         heard = listener.heard
         print(
             f'ticks, {count} cores busy, {sent.size} of them: late by {p50:.3f} ms (p50), '
-            f'{p99:.3f} ms (p99), {largest:.3f} ms (largest)\n'
+            f'{p99:.3f} ms (p99), {largest:.3f} ms (largest); '
+            f'the earliest {-late.min():.3f} ms early\n'
             f'samples lost {heard.lost}, repeated {heard.restarts}'
         )
 
@@ -275,8 +279,8 @@ def measure_lathes(seconds: float, most: int = 12) -> None:
             )
 
 
-def measure_hour(simulated: float = 3600.0, factor: float = 20.0) -> None:
-    """Memory and losses in an hour of simulated time."""
+def measure_hour(simulated: float, factor: float = 20.0) -> None:
+    """Memory and losses in an hour, or so, of simulated time."""
     with running(LATHE, '-p', f'real_time_factor:={factor}') as lathe, ear() as listener:
         listener.listen_to_samples()
         listener.wait_for_samples()
@@ -293,12 +297,12 @@ def measure_hour(simulated: float = 3600.0, factor: float = 20.0) -> None:
         )
 
 
-FIGURES: dict[str, Callable[[float], Any]] = {
-    'cpu': measure_cpu,
-    'lateness': measure_lateness,
-    'parameter': lambda _seconds: measure_parameter(),
-    'lathes': measure_lathes,
-    'hour': lambda _seconds: measure_hour(),
+FIGURES: dict[str, Callable[[Any], None]] = {
+    'cpu': lambda options: measure_cpu(options.seconds),
+    'lateness': lambda options: measure_lateness(options.seconds),
+    'parameter': lambda _options: measure_parameter(),
+    'lathes': lambda options: measure_lathes(options.seconds),
+    'hour': lambda options: measure_hour(options.simulated),
 }
 
 
@@ -318,6 +322,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])  # type: ignore[union-attr]  # it is above
     parser.add_argument('--seconds', type=float, default=60.0, help='of each measurement')
+    parser.add_argument('--simulated', type=float, default=3600.0, help='seconds of the hour')
     parser.add_argument('figures', nargs='*', help=', '.join(FIGURES), metavar='figure')
     options = parser.parse_args(arguments)
     unknown = set(options.figures) - set(FIGURES)
@@ -327,8 +332,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         rclpy.init()
         print(machine())
-        for name in options.figures or list(FIGURES)[:-1]:
-            FIGURES[name](options.seconds)
+        for name in options.figures or [name for name in FIGURES if name != 'hour']:
+            FIGURES[name](options)
         rclpy.shutdown()
 
 
