@@ -298,7 +298,12 @@ def main() -> None:
     """Run the node until it is told to end."""
     # The executor driven by events would take the samples away.
     spin = partial(spin_in_ticks, serve_period=_SERVE_PERIOD)
-    run_node(lambda: MonitorNode(by_timer=False), by_events=False, spin=spin)
+    run_node(
+        lambda: MonitorNode(by_timer=False),
+        by_events=False,
+        spin=spin,
+        usage=MONITOR.usage('chatter_monitor'),
+    )
 
 
 if __name__ == '__main__':

@@ -14,12 +14,16 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.nodes.parameter_table import ParameterTable, Value
 
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 _OF_QOS = 'qos_overrides.'
 _SET_SERVICES = (SetParameters, SetParametersAtomically)
+
+
+class UnknownParameterError(LatheChatterError):
+    """A name given at the start that is no parameter: with the default nobody would notice."""
 
 
 class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type information
@@ -32,6 +36,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
 
     Raises:
         ParameterError: If an override is not allowed; the sentence names it.
+        UnknownParameterError: If there is no such parameter; the sentence says which is near.
     """
 
     def __init__(self, name: str, table: ParameterTable, **options: Any) -> None:
@@ -110,7 +115,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         for name in overrides:
             self.undeclare_parameter(name)
             if name not in self._table and not name.startswith(_OF_QOS):
-                self.get_logger().warning(self._table.unknown(name))
+                raise UnknownParameterError(self._table.unknown(name))
         return {name: parameter.value for name, parameter in overrides.items()}
 
     def _with_whole_numbers(self, parameters: list[Parameter]) -> list[Parameter]:

@@ -6,6 +6,7 @@ A number is coerced only where nothing is lost: a whole number is accepted where
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from difflib import get_close_matches
@@ -159,11 +160,30 @@ class ParameterTable:
         )
         return '\n'.join((head, *lines))
 
+    def usage(self, node: str) -> str:
+        """What `--help` of a node prints: how to give parameters, and which there are."""
+        example = next(row for row in self if row.default and not isinstance(row.default, list))
+        head = (
+            f'usage: {node} [--ros-args -p {example.name}:={_shown(example.default).strip("`")} '
+            '...]\n\nparameters:'
+        )
+        lines = (
+            f'  {row.name}: {row.meaning.rstrip(".")}; {row.allowed} '
+            f'(default: {_shown(row.default).replace("`", "")})'
+            for row in self
+        )
+        return '\n'.join((head, *lines))
+
     def unknown(self, name: str) -> str:
         """A sentence about a name that is no parameter, with the nearest that is."""
-        near = get_close_matches(name, self._rows, n=1)
+        near = get_close_matches(name, self._rows, n=1) or self._with_word_like(name)
         hint = f': did you mean {near[0]}?' if near else '.'
         return f'There is no parameter {name!r}{hint}'
+
+    def _with_word_like(self, name: str) -> list[str]:
+        """The first name one of whose words is like that, as `depht` for depth_of_cut."""
+        words = {word: row for row in reversed(self._rows) for word in re.split(r'[_.]', row)}
+        return [words[word] for word in get_close_matches(name, words, n=1, cutoff=0.75)]
 
 
 def rows_of(instance: Any, *, prefix: str = '', run_time: bool = False) -> Iterator[Row]:

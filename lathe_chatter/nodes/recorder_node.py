@@ -323,7 +323,7 @@ def main() -> None:
     """
     try:
         # The executor driven by events would call for each message.
-        run_node(RecorderNode, by_events=False)
+        run_node(RecorderNode, by_events=False, usage=RECORDER.usage('run_recorder'))
     except RecordingFailedError as error:
         sys.stderr.write(f'{error}\n')
         raise SystemExit(_FAILED) from None

@@ -20,6 +20,7 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.qos_overriding_options import InvalidQosOverridesError
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from lathe_chatter.errors import LatheChatterError
 
@@ -46,6 +47,10 @@ _START_ERRORS = (
     RuntimeError,  # rcl's: arguments that are no ROS arguments
     OSError,
 )
+
+
+class StartError(LatheChatterError):
+    """A command line that a node does not understand."""
 
 
 class _EndSignal:
@@ -77,6 +82,7 @@ def run_node(
     *,
     by_events: bool = True,
     spin: Spin[_Node] | None = None,
+    usage: str = '',
 ) -> None:
     """Make a node and spin it until SIGINT, SIGTERM or a shutdown of its context.
 
@@ -87,13 +93,16 @@ def run_node(
         args: Command-line arguments, those of the process by default.
         by_events: Whether the executor may be the one driven by events; see `make_executor`.
         spin: How the node is served until it is told to end; by default as `serve` does.
+        usage: What `--help` prints.
 
     Raises:
-        SystemExit: With 2 and a sentence on stderr if the node cannot start as it was asked to.
+        SystemExit: With 0 after `--help`; with 2 and a sentence on stderr if the node cannot
+            start as it was asked to.
     """
     end = _EndSignal()
     node: _Node | None = None
     try:
+        _take_no_words(sys.argv if args is None else ['', *args], usage)
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         end.wait()
@@ -111,6 +120,24 @@ def run_node(
         raise SystemExit(2) from None
     finally:
         _finish(node)
+
+
+def _take_no_words(args: list[str], usage: str) -> None:
+    """Answer `--help`, and refuse any other word: what is ignored would be taken for heard.
+
+    Raises:
+        SystemExit: After `--help`.
+        StartError: On a word that is no ROS argument.
+    """
+    words = remove_ros_args(args)[1:]
+    if '--help' in words or '-h' in words:
+        sys.stdout.write(f'{usage}\n')
+        raise SystemExit(0)
+    if words:
+        raise StartError(
+            f'There is no argument {words[0]!r}: a parameter is given as in '
+            '`--ros-args -p name:=value`, and --help lists them.'
+        )
 
 
 def _finish(node: Node | None) -> None:

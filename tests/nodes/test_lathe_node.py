@@ -359,15 +359,6 @@ def test_a_second_owner_of_the_clock_is_told(start: Callable[..., Any], bench: B
     bench.spin_until(lambda: complaint().startswith('2 nodes publish /clock'), 'a warning')
 
 
-def test_a_name_that_is_no_parameter_is_told_at_the_start(
-    start: Callable[..., Any], bench: Bench
-) -> None:
-    log = bench.listen_first(Log, '/rosout', LATCHED)
-    start(LatheNode, depth_of_cutt=0.001)
-    sentence = "There is no parameter 'depth_of_cutt': did you mean depth_of_cut?"
-    bench.spin_until(lambda: sentence in [entry.msg for entry in log], 'the sentence')
-
-
 def test_its_qos_can_be_overridden(start: Callable[..., Any], bench: Bench) -> None:
     start(LatheNode, **{'qos_overrides./lathe/samples.publisher.reliability': 'best_effort'})
     bench.listen_first(Float64MultiArray, '/lathe/samples')

@@ -147,6 +147,7 @@ def test_a_tick_has_a_whole_number_of_samples() -> None:
 
 def test_an_unknown_name_is_told_its_nearest() -> None:
     assert LATHE.unknown('depth_of_cutt').endswith('did you mean depth_of_cut?')
+    assert LATHE.unknown('depht').endswith('did you mean depth_of_cut?')
     assert LATHE.unknown('zzz') == "There is no parameter 'zzz'."
 
 

@@ -37,6 +37,8 @@ WRONG = {
         "qos_overrides./lathe/samples.publisher.history is 'keep_all': it must be keep_last, for "
         'a node does not wait for its readers.'
     ),
+    (LATHE, 'depht:=0.001'): "There is no parameter 'depht': did you mean depth_of_cut?",
+    (MONITOR, 'foo:=1'): "There is no parameter 'foo'.",
     (MONITOR, 'tool.mass:=-1'): f'tool.mass is -1 kg: it must be {TABLE["tool.mass"].allowed}.',
 }
 
@@ -59,6 +61,24 @@ def test_a_wrong_parameter_at_the_start_is_one_sentence_that_names_it() -> None:
         said = [line for line in (out + err).splitlines() if '[ERROR]' not in line]
         assert said == [WRONG[key]]
         assert process.returncode == 2
+
+
+def test_a_node_explains_itself_and_takes_no_word_that_it_does_not_know() -> None:
+    command = [sys.executable, '-m', LATHE]
+    told = subprocess.run(
+        [*command, '--help'], check=False, capture_output=True, text=True, timeout=60
+    )
+    assert told.returncode == 0
+    assert 'depth_of_cut: depth of cut w; a finite number from 0 to 0.01 m (default: 0.0005)' in (
+        told.stdout
+    )
+    wrong = subprocess.run(
+        [*command, '--bogus', '--ros-args', '-p', 'seed:=1'],
+        check=False, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert wrong.returncode == 2
+    assert wrong.stderr.startswith("There is no argument '--bogus'")
+    assert len(wrong.stderr.splitlines()) == 1
 
 
 @pytest.fixture
