@@ -61,7 +61,7 @@ def show_run(history: History, console: Console) -> dict[str, Any]:
         )
     console.print(table)
     console.print(
-        'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and\n'
+        'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and '
         'as the rightmost characteristic root has them, of the machine open and on its bearing.'
     )
     folder = history.path if history.path.is_dir() else history.path.parent

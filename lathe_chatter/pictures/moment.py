@@ -10,7 +10,7 @@ import numpy as np
 from lathe_chatter.history import History
 from lathe_chatter.model import Array
 from lathe_chatter.moments import Moment
-from lathe_chatter.pictures.style import TOOL, WORKPIECE, Scale, grid, scale_for
+from lathe_chatter.pictures.style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for
 from lathe_chatter.stability import contact_at, rightmost_root
 
 if TYPE_CHECKING:
@@ -24,7 +24,9 @@ _LEAST = 1e-6
 """m: half an axis at least, and 1e-3 m/s. A cut at rest is a point: its rounding is no motion."""
 _LEAST_VELOCITY = 1e-3
 _FAINTEST = 1e-9
-"""m: smallest amplitude at the top of a spectrum."""
+"""m: what moves less is at rest: its spectrum would be one of rounding."""
+_TOP_AT_REST = 1e-6
+"""m: top of the empty spectrum of a cut at rest."""
 
 
 def draw_portrait(axes: Axes, history: History, moment: Moment) -> None:
@@ -59,17 +61,20 @@ def draw_section(axes: Axes, history: History, moment: Moment) -> None:
 
 def draw_spectrum(axes: Axes, history: History, moment: Moment) -> None:
     """Amplitude spectra of both displacements, with the frequency that the root predicts."""
-    scale, top = Scale(1e6, 'µm'), _FAINTEST
+    scale, top = Scale(1e6, 'µm'), 0.0
     for name, colour, _ in _BODIES:
         spectrum = moment.spectrum(f'{name}_displacement')
         shown = (spectrum.frequency <= _HIGHEST) & (spectrum.amplitude > 0.0)
-        if not shown.any():
+        if not shown.any() or spectrum.amplitude[shown].max() < _FAINTEST:
             continue
         top = max(top, float(spectrum.amplitude[shown].max()))
         axes.plot(
             spectrum.frequency[shown], spectrum.amplitude[shown] * scale.factor,
             color=colour, lw=0.9, label=name,
         )  # fmt: skip
+    if not top:
+        _say_at_rest(axes, 'no amplitude above 1 nm')
+        top = _TOP_AT_REST
     contact = contact_at(history.machine, moment.cut, tool_leaves_cut=history.tool_leaves_cut)
     root = rightmost_root(
         history.machine,
@@ -105,9 +110,16 @@ def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool)
         shades = [(*to_rgb(colour), alpha) for alpha in np.linspace(0.15, 1.0, x.size).tolist()]
         axes.scatter(x, y, s=9, color=shades, marker=marker, lw=0)
     _widen(axes, _LEAST * places.factor, _LEAST_VELOCITY * speeds.factor)
+    if all(x.size and float(np.ptp(x)) < _FAINTEST for x, _ in pairs.values()):
+        _say_at_rest(axes, 'both at rest, within 1 nm')
     axes.set_xlabel(places.label('displacement'))
     axes.set_ylabel(speeds.label('velocity'))
     grid(axes)
+
+
+def _say_at_rest(axes: Axes, text: str) -> None:
+    """Say in the middle of a plot why it is empty."""
+    axes.text(0.6, 0.25, text, transform=axes.transAxes, ha='center', fontsize=9, color=NEUTRAL)
 
 
 def _widen(axes: Axes, least_x: float, least_y: float) -> None:

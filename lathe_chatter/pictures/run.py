@@ -133,23 +133,20 @@ def _label_changes(axes: Axes, history: History) -> None:
     """Say above the plot what changed, and where the flag was up."""
     last, height = -history.duration, 4
     labels = [
-        (change.time, '\n'.join(on_the_shop_floor(*entry) for entry in change.new.items()))
+        (change.time, '\n'.join(on_the_shop_floor(*entry) for entry in change.new.items()), 'k')
         for change in history.changes
     ]
-    labels += [(knock.time, f'knock {knock.impulse * 1e3:g} mN s') for knock in history.knocks]
-    for time, text in sorted(labels):
+    labels += [
+        (knock.time, f'knock {knock.impulse * 1e3:g} mN s', 'k') for knock in history.knocks
+    ]
+    spans = history.chatter_spans()
+    labels += [(max(start, 0.0), 'chatter flagged', ALARM_TEXT) for start, _ in spans[:1]]
+    for time, text, colour in sorted(labels):
         # One that would run into the one before stands above it.
         near = time - last < _LABEL_WIDTH * history.duration
         height = height + 12 * (text.count('\n') + 1) if near else 4
         last = time
         axes.annotate(
             text, (time, 1.0), (3, height), xycoords=('data', 'axes fraction'),
-            textcoords='offset points', fontsize=9, va='bottom',
-        )  # fmt: skip
-    spans = history.chatter_spans()
-    if spans:
-        start, _ = spans[0]
-        axes.annotate(
-            'chatter flagged', (max(start, 0.0), 0.04), (3, 0), xycoords=('data', 'axes fraction'),
-            textcoords='offset points', fontsize=9, color=ALARM_TEXT,
+            textcoords='offset points', fontsize=9, va='bottom', color=colour,
         )  # fmt: skip

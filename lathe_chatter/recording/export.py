@@ -20,6 +20,7 @@ from lathe_chatter.recording.reading.frames import UNITS, optional
 from lathe_chatter.recording.reading.reader import Run, RunReadError
 from lathe_chatter.recording.reading.sample_series import Seams, at
 from lathe_chatter.recording.ros_messages import topic_of_type
+from lathe_chatter.recording.writing.whole import whole_folder
 from lathe_chatter.recording.writing.writer import RunWriter
 
 NUMBER_TYPE = 'std_msgs/msg/Float64'
@@ -137,7 +138,7 @@ def unroll(
     parts = _Parts(run, chosen, progress)
     topic = chosen.topic or run.samples_topic()
     written, base, last = 0, 0, 0
-    with RunWriter(path) as writer:
+    with whole_folder(path), RunWriter(path) as writer:
         topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != _TIME}
         for name in topics.values():
             writer.add_topic(topic_of_type(name, NUMBER_TYPE))
@@ -176,7 +177,7 @@ class _Parts:
         first = next(iter(run.sample_blocks(chosen.topic)), None)
         if first is None:
             topic = chosen.topic or run.samples_topic()
-            raise RunReadError(f'{run.path} holds no samples of the topic {topic}.')
+            raise run.without_samples(topic)
         wanted = first.columns if chosen.columns is None else (_TIME, *chosen.columns)
         missing = sorted(set(wanted) - set(first.columns))
         if missing:

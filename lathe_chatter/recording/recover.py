@@ -13,6 +13,7 @@ from lathe_chatter.recording.reading.reader import Run, raw_of, read_run
 from lathe_chatter.recording.reading.recorded_file import RecordedFile, offers_of
 from lathe_chatter.recording.reading.scan import Damage
 from lathe_chatter.recording.writing.run_files import CLOSED
+from lathe_chatter.recording.writing.whole import whole_folder
 from lathe_chatter.recording.writing.writer import RunWriter, Topic
 
 _NOT_COPIED = (CLOSED, 'rosbag2')
@@ -51,7 +52,7 @@ def recover(path: Path | str, output: Path) -> Recovery:
     saved: Counter[str] = Counter()
     last: dict[str, int] = {}
     damage: list[Damage] = [*old.damage]
-    with RunWriter(output) as writer:
+    with whole_folder(output), RunWriter(output) as writer:
         for place, file in enumerate(old.files):
             if place:
                 writer.split()

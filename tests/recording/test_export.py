@@ -106,6 +106,23 @@ def test_a_column_that_is_not_there_is_one_sentence(
     assert 'have no column speed.' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('form', [(), ('--unrolled',)], ids=['csv', 'unrolled'])
+def test_an_export_that_fails_leaves_nothing_in_the_way_of_the_next(
+    folder: Path, form: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = folder / 'run_0.mcap'
+    whole = file.read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 1
+    file.write_bytes(flipped)
+    before = sorted(folder.parent.iterdir())
+    assert main(['export', str(folder), *form]) == 2
+    assert 'is damaged' in capsys.readouterr().err
+    assert sorted(folder.parent.iterdir()) == before
+    file.write_bytes(whole)
+    assert main(['export', str(folder), *form]) == 0
+
+
 @pytest.mark.parametrize(
     ('options', 'words'),
     [

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mcap.writer import MCAP0_MAGIC
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from lathe_chatter.recording.reading.choice import chosen_columns, chosen_range
 from lathe_chatter.recording.reading.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.reading.frames import to_pandas, to_xarray
 from lathe_chatter.recording.reading.recorded_file import Contents, Note, RecordedFile
@@ -94,7 +96,8 @@ class Run:
         found: dict[str, str] = {}
         for file in self._opened():
             if not file.has_summary:
-                self._on_damage(Damage(file.path, 0, 0, 'it has no sound summary at its end'))
+                end = file.path.stat().st_size
+                self._on_damage(Damage(file.path, end, end, 'it has no sound summary'))
             found |= file.topics()
         return found
 
@@ -184,21 +187,30 @@ class Run:
             end: Simulated time of the last wanted, s.
 
         Raises:
+            ParameterError: If columns or times are no such thing.
             RunReadError: If a file is damaged, there are no samples, no such columns, or several
                 lathes and no topic is named.
             LayoutError: If a message is no block of samples.
         """
         name = topic or self.samples_topic()
-        wanted = None if columns is None else tuple(columns)
+        wanted = chosen_columns(columns)
+        start, end = chosen_range(start, end)
         files = [*self._opened()]
         expected = sum(file.count(name) for file in files)
         found = joined(_cuts(files, name, wanted), expected, start, end)
         if found is None:
-            raise RunReadError(f'{self.path} holds no samples of {name}.')
+            raise self.without_samples(name)
         if wanted is not None and set(wanted) - set(found.columns):
             missing = ', '.join(sorted(set(wanted) - set(found.columns)))
             raise RunReadError(f'The samples of {name} in {self.path} have no column {missing}.')
         return found
+
+    def without_samples(self, topic: str) -> RunReadError:
+        """The error of a topic that has no samples: it says which have."""
+        kinds = self.topics.items()
+        others = sorted(name for name, kind in kinds if kind == SAMPLES_TYPE and name != topic)
+        hint = f': those that it has are of {", ".join(others)}.' if others else '.'
+        return RunReadError(f'{self.path} holds no samples of the topic {topic}{hint}')
 
     def count_of_samples(self, topic: str | None = None) -> int | None:
         """About how many samples a lathe has here; None where the files do not say."""
@@ -311,6 +323,11 @@ def raw_of(file: RecordedFile, messages: Messages, topics: tuple[str, ...] = ())
         )
 
 
+def _begins_as_mcap(path: Path) -> bool:
+    with path.open('rb') as stream:
+        return stream.read(len(MCAP0_MAGIC)) == bytes(MCAP0_MAGIC)
+
+
 def read_run(path: Path | str, *, damaged: bool = False) -> Run:
     """Open a recorded run.
 
@@ -324,6 +341,8 @@ def read_run(path: Path | str, *, damaged: bool = False) -> Run:
     """
     path = Path(path)
     if path.is_file():
+        if path.suffix != '.mcap' and not _begins_as_mcap(path):
+            raise RunReadError(f'{path} is no MCAP file.')
         return Run(path, (path,), damaged)
     found = run_folder(path)
     absent = [Damage(path / name, 0, 0, 'the file is missing') for name in found.missing]

@@ -130,7 +130,7 @@ def test_a_file_that_is_none_is_refused_and_verified(data: bytes, tmp_path: Path
     file = tmp_path / 'run_0.mcap'
     file.write_bytes(data)
     assert not verify(file).complete
-    with pytest.raises(RunReadError, match='is damaged at byte 0: it has no sound summary'):
+    with pytest.raises(RunReadError, match=f'is damaged at byte {len(data)}: it has no sound'):
         list(read_run(file).topics)
     assert recover(file, tmp_path / 'saved').messages == {}
 
