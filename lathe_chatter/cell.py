@@ -20,6 +20,10 @@ _ENDED_WELL = (0, -signal.SIGINT)
 _SET_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
+class RunFailedError(LatheChatterError):
+    """The run could not be made; the text says why."""
+
+
 class NodeFailedError(LatheChatterError):
     """A node of the cell ended by itself; the text holds what it said last."""
 

@@ -42,10 +42,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0, what the verb says (1 for a verdict that is no), 2 for a user's
-        mistake, 130 when interrupted.
+        mistake, 128 and the number of the signal when interrupted: 130 after Ctrl-C.
     """
+    told: list[int] = []
+
+    def interrupt(number: int, _frame: FrameType | None) -> None:
+        """End on SIGTERM and SIGHUP as on Ctrl-C: what was begun is finished."""
+        told.append(number)
+        raise KeyboardInterrupt
+
     for wish in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(wish, _interrupt)
+        signal.signal(wish, interrupt)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='replace')  # where the terminal lacks a letter
@@ -60,13 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f'lathe-chatter {options.verb}: {where}{error.strerror or error}.\n')
         return USER_ERROR
     except KeyboardInterrupt:
-        return INTERRUPTED
-    return code
-
-
-def _interrupt(_number: int, _frame: FrameType | None) -> None:
-    """End on SIGTERM and SIGHUP as on Ctrl-C: what was begun is finished."""
-    raise KeyboardInterrupt
+        code = INTERRUPTED
+    return 128 + told[0] if code == INTERRUPTED and told else code
 
 
 if __name__ == '__main__':

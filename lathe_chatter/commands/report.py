@@ -66,7 +66,10 @@ def show_run(history: History, console: Console) -> dict[str, Any]:
     )
     folder = history.path if history.path.is_dir() else history.path.parent
     picture = folder / PICTURE
-    draw_run(history, picture)
+    try:
+        draw_run(history, picture)
+    except OSError as error:  # a full disk does not say which file it refuses
+        raise OSError(error.errno, error.strerror, str(picture)) from None
     console.print(f'run      {history.path}\npicture  {picture}', soft_wrap=True)
     return {
         'run': str(history.path),

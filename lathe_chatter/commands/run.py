@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from lathe_chatter.cell import Cell
+from lathe_chatter.cell import RunFailedError
 from lathe_chatter.commands.output import tell_verdict
 from lathe_chatter.commands.report import show_run
-from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.history import read_history
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.reading.reader import RunReadError
@@ -30,28 +25,11 @@ from lathe_chatter.scenario import (
 )
 from lathe_chatter.warm_up import warm_up
 
-if TYPE_CHECKING:
-    from lathe_chatter.nodes.operator_node import Operator
-
 NAME = 'run'
 HELP = 'start lathe, monitor and recorder, play a scenario, and leave the recorded run'
 EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
 
 INTERRUPTED = 130
-_START_PATIENCE = 30.0
-"""s for the nodes to find each other."""
-_DISCOVERY = 1.5
-"""s in which nodes that are there already become known."""
-_OURS = {'lathe': 1, 'chatter_monitor': 1, 'run_recorder': 1, 'lathe_operator': 1}
-"""How many nodes of each name a run has."""
-_READERS = 3
-"""Recorder, monitor and operator: the lathe cuts nothing before it has met them all."""
-_GRACE = 10.0
-"""s of simulated time beyond a scenario's end for what the monitor is expected to say."""
-
-
-class RunFailedError(LatheChatterError):
-    """The run could not be made; the text says why."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -110,134 +88,16 @@ def _has_samples(output: Path) -> bool:
 
 
 def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool:
-    """Start the cell, play, and end the cell; whether it was interrupted."""
-    try:
-        import rclpy
-        from rclpy.executors import SingleThreadedExecutor
-        from rclpy.signals import SignalHandlerOptions
+    """Play a scenario with a cell of nodes; whether it was interrupted.
 
-        from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
-        from lathe_chatter.nodes.parameters import LATHE
+    Raises:
+        RunFailedError: If there is no ROS 2 here, or the run fails.
+    """
+    try:
+        from lathe_chatter.nodes.play import play
     except ImportError as error:
         raise RunFailedError(
             f'ROS 2 is not there ({error}): source an installation, or use `make run`, '
             'which installs what it needs.'
         ) from None
-    for name, value in scenario.parameters.items():
-        if name not in LATHE:
-            raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
-        LATHE[name].check(value)
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    operator = Operator(scenario, tell=console.print)
-    executor = SingleThreadedExecutor()
-    executor.add_node(operator)
-    interrupted = False
-    try:
-        with Cell() as cell:
-            try:
-                with console.status('Starting the monitor and the recorder ...'):
-                    _look_around(operator, executor)
-                    cell.start(
-                        'run_recorder',
-                        'lathe_chatter.nodes.recorder_node',
-                        parameter_arguments(
-                            {'output': str(output), 'attachments': [str(file.resolve())]}
-                        ),
-                    )
-                    cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
-                    _await_nodes(operator, executor, cell)
-                cell.start(
-                    'lathe',
-                    'lathe_chatter.nodes.lathe_node',
-                    parameter_arguments({'await_readers': _READERS, **scenario.parameters}),
-                )
-                operator.playing = True
-                _follow(operator, executor, cell, scenario, console)
-            except KeyboardInterrupt:
-                interrupted = True
-            complaints = cell.end()
-        if complaints:
-            raise RunFailedError(' '.join(complaints))
-    finally:
-        executor.shutdown()
-        operator.destroy_node()
-        rclpy.try_shutdown()
-    return interrupted
-
-
-def _look_around(operator: Operator, executor: Any) -> None:
-    """See for a while whether the domain is free, before anything is started in it."""
-    until = time.monotonic() + _DISCOVERY
-    while time.monotonic() < until:
-        executor.spin_once(timeout_sec=0.1)
-        _refuse_company(operator, {'lathe_operator': 1})
-
-
-def _refuse_company(operator: Operator, ours: Mapping[str, int] = _OURS) -> None:
-    """See that the domain has no nodes of our names but ours.
-
-    Raises:
-        RunFailedError: If it has: they would be taken for each other.
-    """
-    places = operator.get_node_names_and_namespaces()
-    names = [name for name, namespace in places if namespace == operator.get_namespace()]
-    other = next((name for name in _OURS if names.count(name) > ours.get(name, 0)), None)
-    if other is not None:
-        raise RunFailedError(
-            f'Another {other} is in this ROS domain already: end it, or set ROS_DOMAIN_ID to '
-            'another number.'
-        )
-
-
-def _await_nodes(operator: Operator, executor: Any, cell: Cell) -> None:
-    """Wait until the recorder and the monitor are there, so that nothing of the lathe is lost."""
-    until = time.monotonic() + _START_PATIENCE
-    wanted = {'run_recorder', 'chatter_monitor'}
-    while not wanted <= set(operator.get_node_names()):
-        executor.spin_once(timeout_sec=0.1)
-        cell.check()
-        _refuse_company(operator)
-        if time.monotonic() > until:
-            missing = ' and '.join(sorted(wanted - set(operator.get_node_names())))
-            raise RunFailedError(f'{missing} did not appear within {_START_PATIENCE:.0f} s.')
-    _refuse_company(operator, {**_OURS, 'lathe': 0})
-
-
-def _follow(
-    operator: Operator, executor: Any, cell: Cell, scenario: Scenario, console: Console
-) -> None:
-    """Spin until the scenario is played, with a bar of simulated time."""
-    columns = (
-        TextColumn('{task.completed:6.2f} of {task.total:.0f} s'),
-        BarColumn(bar_width=None),
-        TextColumn('{task.description}'),
-        TimeElapsedColumn(),
-    )
-    until = time.monotonic() + _START_PATIENCE
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task('waiting for the lathe', total=scenario.duration)
-        while not _finished(operator, scenario):
-            executor.spin_once(timeout_sec=0.1)
-            cell.check()
-            _refuse_company(operator)
-            if operator.failure is not None:
-                raise operator.failure
-            if operator.time == 0.0 and time.monotonic() > until:
-                raise RunFailedError(
-                    f'The lathe published no sample within {_START_PATIENCE:.0f} s.'
-                )
-            progress.update(
-                bar,
-                completed=min(operator.time, scenario.duration),
-                description=operator.state if operator.time else 'waiting for the lathe',
-            )
-
-
-def _finished(operator: Operator, scenario: Scenario) -> bool:
-    """Whether the time is over, and the monitor has said what is expected or will not."""
-    if operator.time < scenario.duration:
-        return False
-    pending = not operator.idle or any(
-        expected and word not in operator.said for word, expected in scenario.expect.items()
-    )
-    return not pending or operator.time >= scenario.duration + _GRACE
+    return play(scenario, file, output, console)

@@ -130,7 +130,7 @@ def test_an_interrupted_run_is_complete_up_to_then(
             if 'depth_of_cut = 0.00062' in line and not told:
                 process.send_signal(number)
                 told = True
-        assert process.wait(60) == 130, ''.join(seen)
+        assert process.wait(60) == 128 + number, ''.join(seen)
     assert 'complete up to that moment' in ''.join(seen)
     assert (output / 'metadata.yaml').is_file()
 

@@ -39,6 +39,19 @@ def test_a_knocked_cut_is_simulated_and_reported(
     assert ET.parse(run / 'report.svg').getroot().tag.endswith('svg')
 
 
+@pytest.mark.skipif(not Path('/dev/full').exists(), reason='a device of Linux')
+def test_a_full_disk_names_the_file_that_it_refuses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / 'run'
+    assert cli.main(['simulate', '--output', str(run), '--duration', '0.5']) == 0
+    capsys.readouterr()
+    (run / 'report.png').symlink_to('/dev/full')
+    assert cli.main(['report', str(run / 'run_0.mcap')]) == 2
+    said = capsys.readouterr().err.strip()
+    assert said == f'lathe-chatter report: {run}/report.png: No space left on device.'
+
+
 def test_a_scenario_whose_expectation_fails_is_exit_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
