@@ -23,7 +23,7 @@ _SET_SERVICES = (SetParameters, SetParametersAtomically)
 
 
 class UnknownParameterError(LatheChatterError):
-    """A name given at the start that is no parameter: with the default nobody would notice."""
+    """A misspelt name given at the start: the default would be taken, and nobody notice."""
 
 
 class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type information
@@ -36,7 +36,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
 
     Raises:
         ParameterError: If an override is not allowed; the sentence names it.
-        UnknownParameterError: If there is no such parameter; the sentence says which is near.
+        UnknownParameterError: If a name is nearly that of a parameter; the sentence says which.
     """
 
     def __init__(self, name: str, table: ParameterTable, **options: Any) -> None:
@@ -115,7 +115,10 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         for name in overrides:
             self.undeclare_parameter(name)
             if name not in self._table and not name.startswith(_OF_QOS):
-                raise UnknownParameterError(self._table.unknown(name))
+                if self._table.nearest(name):
+                    raise UnknownParameterError(self._table.unknown(name))
+                # As from a file of parameters for all nodes of a system.
+                self.get_logger().warning(self._table.unknown(name))
         return {name: parameter.value for name, parameter in overrides.items()}
 
     def _with_whole_numbers(self, parameters: list[Parameter]) -> list[Parameter]:

@@ -176,9 +176,14 @@ class ParameterTable:
 
     def unknown(self, name: str) -> str:
         """A sentence about a name that is no parameter, with the nearest that is."""
-        near = get_close_matches(name, self._rows, n=1) or self._with_word_like(name)
-        hint = f': did you mean {near[0]}?' if near else '.'
+        near = self.nearest(name)
+        hint = f': did you mean {near}?' if near else '.'
         return f'There is no parameter {name!r}{hint}'
+
+    def nearest(self, name: str) -> str | None:
+        """The parameter that may have been meant by a name that is none."""
+        near = get_close_matches(name, self._rows, n=1) or self._with_word_like(name)
+        return near[0] if near else None
 
     def _with_word_like(self, name: str) -> list[str]:
         """The first name one of whose words is like that, as `depht` for depth_of_cut."""

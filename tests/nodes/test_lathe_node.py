@@ -359,6 +359,15 @@ def test_a_second_owner_of_the_clock_is_told(start: Callable[..., Any], bench: B
     bench.spin_until(lambda: complaint().startswith('2 nodes publish /clock'), 'a warning')
 
 
+def test_a_name_that_is_like_no_parameter_is_only_warned_of(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    log = bench.listen_first(Log, '/rosout', LATCHED)
+    start(LatheNode, zzz=0.001)
+    sentence = "There is no parameter 'zzz'."
+    bench.spin_until(lambda: sentence in [entry.msg for entry in log], 'the sentence')
+
+
 def test_its_qos_can_be_overridden(start: Callable[..., Any], bench: Bench) -> None:
     start(LatheNode, **{'qos_overrides./lathe/samples.publisher.reliability': 'best_effort'})
     bench.listen_first(Float64MultiArray, '/lathe/samples')

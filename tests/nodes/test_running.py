@@ -38,7 +38,6 @@ WRONG = {
         'a node does not wait for its readers.'
     ),
     (LATHE, 'depht:=0.001'): "There is no parameter 'depht': did you mean depth_of_cut?",
-    (MONITOR, 'foo:=1'): "There is no parameter 'foo'.",
     (MONITOR, 'tool.mass:=-1'): f'tool.mass is -1 kg: it must be {TABLE["tool.mass"].allowed}.',
 }
 
