@@ -63,12 +63,14 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
             SetParametersAtomically, 'lathe/set_parameters_atomically'
         )
         self.create_subscription(Float64MultiArray, 'lathe/samples', self._on_samples, _NEWEST)
-        self.create_subscription(Bool, 'chatter_monitor/chatter', self._on_flag, _LATCHED)
-        self.create_subscription(String, 'chatter_monitor/state', self._on_state, _LATCHED)
+        # The monitor publishes its figures before the flag that they explain. Of what is ready
+        # together the executor serves first what was subscribed to first.
         for name in _ESTIMATES:
             self.create_subscription(
                 Float64, f'chatter_monitor/{name}', self._estimate_taker(name), QoSProfile(depth=1)
             )
+        self.create_subscription(Bool, 'chatter_monitor/chatter', self._on_flag, _LATCHED)
+        self.create_subscription(String, 'chatter_monitor/state', self._on_state, _LATCHED)
 
     @property
     def idle(self) -> bool:

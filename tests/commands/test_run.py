@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -68,7 +69,7 @@ def play(scenario: Path, output: Path, environment: dict[str, str]) -> dict[str,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     figures: dict[str, Any] = json.loads(done.stdout)
-    return figures
+    return {**figures, 'said': done.stderr}
 
 
 def test_the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it(
@@ -87,6 +88,10 @@ def test_the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it(
     bounds = [flagged['roots'][regime]['frequency'] for regime in ('open', 'seated')]
     assert bounds[0] - 2.0 < flagged['frequency'] < bounds[1] + 2.0
     assert flagged['growth_rate'] > 0
+    # What was told while it ran is of this flag too, and not of the cut before.
+    told = re.search(r'chatter flagged: (\S+) Hz', figures['said'])
+    assert told is not None
+    assert float(told[1]) == pytest.approx(flagged['frequency'], abs=5.0)
     assert max(root['growth_rate'] for root in cured['roots'].values()) < 0
     assert Path(figures['picture']).stat().st_size > 20_000
 
