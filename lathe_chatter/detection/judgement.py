@@ -29,29 +29,17 @@ from lathe_chatter.detection.energy import (
 from lathe_chatter.detection.identification import (
     ANGULAR_FREQUENCY,
     CLEARNESS,
-    CUTTING,
-    CUTTING_ERROR,
     GROWTH,
     GROWTH_ERROR,
-    STIFFNESS,
     WINDOW_TOOL_POWER,
 )
 from lathe_chatter.detection.kernels import Complex
 from lathe_chatter.detection.ledger import (
     ALARMED,
-    AMPLITUDE,
     CALM,
-    CHATTER,
-    FIGURE_CUTTING,
-    FIGURE_ERROR,
-    FIGURE_GROWTH,
-    FIGURE_OMEGA,
-    FIGURE_STIFFNESS,
-    FORCED,
     FORCED_AMPLITUDE,
     HOLDING,
     HOPS,
-    IDLE,
     ONCE,
     PEAK,
     PEAK_ONCE,
@@ -64,14 +52,11 @@ from lathe_chatter.detection.ledger import (
     SINCE_ALARM,
     SINCE_JUMP,
     SMALLEST,
-    STABLE,
     STATE,
     STEPPED,
     STRICTNESS,
     SUSPECTED,
-    UNKNOWN,
     USUAL,
-    WATCH,
     WINDOWS,
     Ledger,
 )
@@ -81,6 +66,7 @@ from lathe_chatter.detection.signals import (
     PHASE_SEEN,
     TOOL_MEAN,
 )
+from lathe_chatter.detection.telling import cuts, state_of, tell
 from lathe_chatter.model import Array
 
 LIMITS = np.array([10.0, 7.2, 6.1, 5.5, 5.1, 4.7])
@@ -111,9 +97,6 @@ _PATIENT = 4
 """The shortest window whose growth is believed without a model."""
 _RAISED = 1.5
 """Logarithm of the energy ratio without which the growth rate alone is no alarm."""
-_WATCH = 0.75
-_ONSET = 8
-"""Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
 
 _OFF_PHASE, _ON_PHASE = 0.2, 0.9
 """Once-per-turn variance over all: below the spindle's own vibration, above chatter."""
@@ -121,8 +104,6 @@ _OUT_OF_CUT = 0.9
 _STEADY = 0.05
 _SATURATED = 20
 _CALM = 20
-_CUTS, _PUSHED = 4.0, 32
-"""Standard errors from which on a force is one, and hops over which its mean is taken."""
 _QUIET = 0.12
 """Part of its peak at which chatter is over, if it is not back at the baseline before."""
 
@@ -226,64 +207,6 @@ def _decide(ledger: Ledger, strongest_amplitude: float) -> None:
 
 
 @compiled()
-def _cuts(known: Array, products: Array, newest: int) -> bool:
-    """Whether anything is cut: C w is clearly not zero, or the tool is pushed aside on average."""
-    if not known[CUTTING] <= _CUTS * known[CUTTING_ERROR]:
-        return True
-    mean = squares = 0.0
-    for back in range(_PUSHED):
-        place = products[(newest - back) % HOPS, TOOL_MEAN]
-        mean += place / _PUSHED
-        squares += place**2 / _PUSHED
-    # Neighbours vibrate together: the mean of 32 is about as sure as that of 8.
-    error = math.sqrt(max(squares - mean**2, 0.0) / (_PUSHED / 4.0))
-    return abs(mean) > _CUTS * error
-
-
-@compiled()
-def _state(ledger: Ledger, cutting: bool, forced: bool) -> int:
-    numbers, flags = ledger.numbers, ledger.flags
-    if flags[ALARMED] != 0:
-        return CHATTER
-    if flags[RAMPING] != 0 or flags[SEEN] < SETTLING:
-        return UNKNOWN
-    if not cutting:
-        return IDLE
-    if numbers[SCORE] > _WATCH * numbers[STRICTNESS]:
-        return WATCH
-    if forced:
-        return FORCED
-    return STABLE
-
-
-@compiled()
-def _tell(
-    ledger: Ledger, windows: Array, wave: tuple[float, float, float], model: bool, amplitude: float
-) -> None:
-    """Hand out the figures of the window that knows the growth rate best."""
-    numbers = ledger.numbers
-    numbers[AMPLITUDE] = amplitude
-    best = -1
-    alarmed, since = ledger.flags[ALARMED] != 0, ledger.flags[SINCE_ALARM]
-    for number in range(windows.shape[0]):
-        if alarmed and best >= 0 and WINDOWS[number] > since + _ONSET:
-            break
-        error = windows[number, GROWTH_ERROR]
-        if error == error and (best < 0 or error < windows[best, GROWTH_ERROR]):
-            best = number
-    if best < 0:
-        numbers[FIGURE_GROWTH], numbers[FIGURE_ERROR], numbers[FIGURE_OMEGA] = wave
-        numbers[FIGURE_CUTTING] = numbers[FIGURE_STIFFNESS] = np.nan
-        return
-    known = windows[best]
-    numbers[FIGURE_GROWTH], numbers[FIGURE_ERROR] = known[GROWTH], known[GROWTH_ERROR]
-    numbers[FIGURE_OMEGA] = known[ANGULAR_FREQUENCY]
-    if model:
-        numbers[FIGURE_CUTTING] = known[CUTTING]
-        numbers[FIGURE_STIFFNESS] = known[STIFFNESS]
-
-
-@compiled()
 def judge(
     ledger: Ledger, newest: int, products: Array, windows: Array, phases: Array, poles: Complex,
     centres: Array, figures: Array, model: bool,
@@ -336,6 +259,6 @@ def judge(
         steady = _saturated(ledger, products, newest, strongest, stiff)
         flags[SATURATED] = flags[SATURATED] + 1 if steady else 0
     _decide(ledger, amplitude)
-    _tell(ledger, windows, wave, model, amplitude)
-    cutting = not model or _cuts(windows[WINDOWS.size - 1], products, newest)
-    flags[STATE] = _state(ledger, cutting, forced)
+    tell(ledger, windows, wave, model, amplitude)
+    cutting = not model or cuts(windows[WINDOWS.size - 1], products, newest)
+    flags[STATE] = state_of(ledger, cutting, forced)
