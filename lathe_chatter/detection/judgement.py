@@ -71,9 +71,9 @@ from lathe_chatter.model import Array
 
 LIMITS = np.array([10.0, 7.2, 6.1, 5.5, 5.1, 4.7])
 """Growth rate over its standard error that is an alarm by itself, in each window."""
-_ENERGY_LIMIT = 2.92
+_ENERGY_LIMIT = 2.88
 """Logarithm of the energy ratio, and a share of growth over its error, that make an alarm."""
-_BLURRED = 0.873
+_BLURRED = 0.91
 """Part of that limit where the sensors' noise outweighs the vibration, and is the steadier."""
 _ENERGY_ALONE = 3.2
 """The same of the energy ratio alone, without a model of the machine."""

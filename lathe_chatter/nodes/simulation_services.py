@@ -95,6 +95,13 @@ class _Services:
         if wanted == self._state():
             result.result = SetSimulationState.Response.ALREADY_IN_TARGET_STATE
             return response
+        if (self._state(), wanted) == (
+            SimulationState.STATE_STOPPED,
+            SimulationState.STATE_PAUSED,
+        ):
+            result.result = SetSimulationState.Response.INCORRECT_TRANSITION
+            result.error_message = 'A lathe that is stopped cannot be paused, only played.'
+            return response
         if wanted == SimulationState.STATE_STOPPED:
             self._simulator.reset()
             answer = self._simulator.pause(pause=True)
@@ -115,7 +122,7 @@ class _Services:
             result.result = Result.RESULT_OPERATION_FAILED
             result.error_message = f'At most {_MOST_STEPS} ticks in one request.'
             return response
-        _report(result, self._simulator.step(request.steps), Result.RESULT_INCORRECT_STATE)
+        _report(result, self._simulator.step(request.steps), Result.RESULT_OPERATION_FAILED)
         return response
 
     def reset(self, request: Any, response: Any) -> Any:
