@@ -137,6 +137,7 @@ def _plot(curves: dict[str, dict[str, Array]], file: str) -> None:
 
     mpl.use('Agg')
     from matplotlib import pyplot as plt
+    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
     figure, axes = plt.subplots(1, len(curves), figsize=(4.2 * len(curves), 3.8), squeeze=False)
     for axis, (noise, of_names) in zip(axes[0], curves.items(), strict=True):
@@ -145,6 +146,9 @@ def _plot(curves: dict[str, dict[str, Array]], file: str) -> None:
             axis.plot(kept[:, 0], kept[:, 1], 'o-', ms=3, label=name)
         axis.axvline(ASKED, color='0.6', lw=1)
         axis.set(xscale='log', yscale='log', title=noise, xlabel='false alarms per hour')
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter(ScalarFormatter())
+        axis.yaxis.set_minor_formatter(NullFormatter())
     axes[0, 0].set_ylabel('median delay, revolutions')
     axes[0, 0].legend(frameon=False, fontsize=8)
     figure.tight_layout()
