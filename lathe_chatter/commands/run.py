@@ -12,6 +12,7 @@ from rich.console import Console
 from lathe_chatter.cell import RunFailedError
 from lathe_chatter.commands.output import tell_verdict
 from lathe_chatter.commands.report import show_run
+from lathe_chatter.held_signals import HeldSignals
 from lathe_chatter.history import read_history
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.reading.reader import RunReadError
@@ -94,7 +95,8 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
         RunFailedError: If there is no ROS 2 here, or the run fails.
     """
     try:
-        from lathe_chatter.nodes.play import play
+        with HeldSignals():  # an import cut short would look like a ROS 2 that is not there
+            from lathe_chatter.nodes.play import play
     except ImportError as error:
         raise RunFailedError(
             f'ROS 2 is not there ({error}): source an installation, or use `make run`, '

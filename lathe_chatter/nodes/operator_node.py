@@ -37,6 +37,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         options: As for `rclpy.node.Node`.
 
     Attributes:
+        scenario: What is played.
         time: Simulated time of the newest sample, s.
         amplitude: Largest displacement of the tool in the newest block of samples, m.
         state: The monitor's word for the cut.
@@ -48,6 +49,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
     def __init__(self, scenario: Scenario, tell: Callable[[str], None], **options: Any) -> None:
         """Listen; nothing is changed before the lathe cuts."""
         super().__init__('lathe_operator', **options)
+        self.scenario = scenario
         self.time = 0.0
         self.state = 'waiting'
         self.said: list[str] = []

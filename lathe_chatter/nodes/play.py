@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from lathe_chatter.cell import Cell, RunFailedError
+from lathe_chatter.held_signals import HeldSignals
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameters import LATHE
 from lathe_chatter.scenario import Scenario
@@ -49,49 +50,70 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
         if name not in LATHE:
             raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
         LATHE[name].check(value)
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    operator = Operator(scenario, tell=console.print)
-    executor = SingleThreadedExecutor()
-    executor.add_node(operator)
-    interrupted = False
     try:
-        with Cell() as cell:
+        with HeldSignals() as held:
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            operator = Operator(scenario, tell=console.print)
+            executor = SingleThreadedExecutor()
+            executor.add_node(operator)
+
+            def spin() -> None:
+                executor.spin_once(timeout_sec=0.1)
+                held.heed()
+
             try:
-                with console.status('Starting the monitor and the recorder ...'):
-                    _look_around(operator, executor)
-                    cell.start(
-                        'run_recorder',
-                        'lathe_chatter.nodes.recorder_node',
-                        parameter_arguments(
-                            {'output': str(output), 'attachments': [str(file.resolve())]}
-                        ),
-                    )
-                    cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
-                    _await_nodes(operator, executor, cell)
+                return _play(operator, spin, file, output, console)
+            finally:
+                executor.shutdown()
+                operator.destroy_node()
+                rclpy.try_shutdown()
+    except KeyboardInterrupt:  # while the nodes were ending: they have ended in order
+        return True
+
+
+def _play(
+    operator: Operator, spin_once: Callable[[], None], file: Path, output: Path, console: Console
+) -> bool:
+    """Play with an operator who is there; whether it was interrupted."""
+    interrupted = False
+    with Cell() as cell:
+
+        def spin() -> None:
+            spin_once()
+            cell.check()
+
+        try:
+            with console.status('Starting the monitor and the recorder ...'):
+                _look_around(operator, spin)
                 cell.start(
-                    'lathe',
-                    'lathe_chatter.nodes.lathe_node',
-                    parameter_arguments({'await_readers': _READERS, **scenario.parameters}),
+                    'run_recorder',
+                    'lathe_chatter.nodes.recorder_node',
+                    parameter_arguments(
+                        {'output': str(output), 'attachments': [str(file.resolve())]}
+                    ),
                 )
-                operator.playing = True
-                _follow(operator, executor, cell, scenario, console)
-            except KeyboardInterrupt:
-                interrupted = True
-            complaints = cell.end()
-        if complaints:
-            raise RunFailedError(' '.join(complaints))
-    finally:
-        executor.shutdown()
-        operator.destroy_node()
-        rclpy.try_shutdown()
+                cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
+                _await_nodes(operator, spin)
+            cell.start(
+                'lathe',
+                'lathe_chatter.nodes.lathe_node',
+                parameter_arguments({'await_readers': _READERS, **operator.scenario.parameters}),
+            )
+            operator.playing = True
+            _follow(operator, spin, console)
+        except KeyboardInterrupt:
+            interrupted = True
+        complaints = cell.end()
+    if complaints:
+        raise RunFailedError(' '.join(complaints))
     return interrupted
 
 
-def _look_around(operator: Operator, executor: Executor) -> None:
+def _look_around(operator: Operator, spin: Callable[[], None]) -> None:
     """See for a while whether the domain is free, before anything is started in it."""
     until = time.monotonic() + _DISCOVERY
     while time.monotonic() < until:
-        executor.spin_once(timeout_sec=0.1)
+        spin()
         _refuse_company(operator, {'lathe_operator': 1})
 
 
@@ -111,13 +133,12 @@ def _refuse_company(operator: Operator, ours: Mapping[str, int] = _OURS) -> None
         )
 
 
-def _await_nodes(operator: Operator, executor: Executor, cell: Cell) -> None:
+def _await_nodes(operator: Operator, spin: Callable[[], None]) -> None:
     """Wait until the recorder and the monitor are there, so that nothing of the lathe is lost."""
     until = time.monotonic() + _START_PATIENCE
     wanted = {'run_recorder', 'chatter_monitor'}
     while not wanted <= set(operator.get_node_names()):
-        executor.spin_once(timeout_sec=0.1)
-        cell.check()
+        spin()
         _refuse_company(operator)
         if time.monotonic() > until:
             missing = ' and '.join(sorted(wanted - set(operator.get_node_names())))
@@ -125,10 +146,9 @@ def _await_nodes(operator: Operator, executor: Executor, cell: Cell) -> None:
     _refuse_company(operator, {**_OURS, 'lathe': 0})
 
 
-def _follow(
-    operator: Operator, executor: Executor, cell: Cell, scenario: Scenario, console: Console
-) -> None:
+def _follow(operator: Operator, spin: Callable[[], None], console: Console) -> None:
     """Spin until the scenario is played, with a bar of simulated time."""
+    scenario = operator.scenario
     columns = (
         TextColumn('{task.completed:6.2f} of {task.total:.0f} s'),
         BarColumn(bar_width=None),
@@ -139,8 +159,7 @@ def _follow(
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task('waiting for the lathe', total=scenario.duration)
         while not _finished(operator, scenario):
-            executor.spin_once(timeout_sec=0.1)
-            cell.check()
+            spin()
             _refuse_company(operator)
             if operator.failure is not None:
                 raise operator.failure

@@ -116,6 +116,8 @@ def run_node(
     except _START_ERRORS as error:
         if node is not None:
             raise
+        if end.came:  # the interrupt, raised amid a call into C++, came out as another error
+            return
         sys.stderr.write(f'{error}\n')
         raise SystemExit(2) from None
     finally:
