@@ -10,7 +10,7 @@ any of them -- the guard trips --> ENDED -- reset --> as it was before, RUNNING 
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 
 class RunState(str, Enum):
@@ -79,3 +79,27 @@ class RunControl:
         self.ended_because = ''
         self.resets += 1
         return Answer(done=True, message=f'At time zero again, {self.state.value}.')
+
+
+class Simulator(Protocol):
+    """What the services of control drive: these requests, on a node of rclpy."""
+
+    @property
+    def run_state(self) -> RunState:
+        """Whether simulated time goes on."""
+
+    @property
+    def samples_taken(self) -> int:
+        """0 at time zero."""
+
+    def pause(self, *, pause: bool) -> Answer:
+        """Pause or go on."""
+
+    def step(self, ticks: int = 1) -> Answer:
+        """Make ticks while paused."""
+
+    def reset(self) -> Answer:
+        """Start again at time zero."""
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
+        """Create a service."""

@@ -9,12 +9,11 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
-from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe_parameters import cut_from, lathe_from
 from lathe_chatter.model import Cut
-from lathe_chatter.nodes import simulation_services
+from lathe_chatter.nodes import control_services, simulation_services
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.lathe_meter import LatheMeter
@@ -34,8 +33,6 @@ _BUDGET = 5_000_000
 """ns that a node which cuts as fast as it can takes before it looks for requests."""
 _READERS_PATIENCE = 0.1
 """s that it then waits at most for its slowest reader; in real time it waits for nobody."""
-
-
 _LOOK_FOR_READERS = 5_000_000
 """ns from one look to the next for the readers that it waits for."""
 
@@ -88,7 +85,9 @@ class LatheNode(ParameterNode):
         self._meter = LatheMeter(self._pacer, tick)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
-        self._create_services()
+        control_services.offer(self)
+        if simulation_services.AVAILABLE:
+            simulation_services.offer(self)
         self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=10))
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._by_timer = by_timer or self._follows
@@ -269,25 +268,6 @@ class LatheNode(ParameterNode):
     def _told(self, answer: Answer) -> Answer:
         self._diagnostics.publish_changes(self._statuses())
         return answer
-
-    def _create_services(self) -> None:
-        def pause(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-            response.success, response.message = self.pause(pause=request.data)
-            return response
-
-        def step(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = self.step()
-            return response
-
-        def reset(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = self.reset()
-            return response
-
-        self.create_service(SetBool, '~/pause', pause)
-        self.create_service(Trigger, '~/step', step)
-        self.create_service(Trigger, '~/reset', reset)
-        if simulation_services.AVAILABLE:
-            simulation_services.offer(self)
 
     # -- diagnostics -----------------------------------------------------------------------
 

@@ -12,10 +12,11 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.utilities import get_rmw_implementation_identifier
 from rosbags.typesys import Stores, get_typestore
-from std_srvs.srv import Trigger
 
 from lathe_chatter.continuity import Joint
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes import recorder_services
+from lathe_chatter.nodes.control import Answer
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_snapshots import ParameterSnapshots
@@ -44,6 +45,8 @@ _DRAIN_PERIOD = 0.02
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
 _FAILED = 1
+
+_NOTHING = Answer(done=False, message='Nothing is being recorded.')
 
 
 class RecordingFailedError(LatheChatterError):
@@ -74,9 +77,7 @@ class RecorderNode(ParameterNode):
         self._failure, self._runs = '', 0
         self._journal, self._stalls = Journal(), Stalls()
         self._diagnostics = Diagnostics(self, 'run recorder')
-        self.create_service(Trigger, '~/start', self._on_start)
-        self.create_service(Trigger, '~/stop', self._on_stop)
-        self.create_service(Trigger, '~/split', self._on_split)
+        recorder_services.offer(self)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_DRAIN_PERIOD, self._drain, clock=steady)
         self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
@@ -147,10 +148,10 @@ class RecorderNode(ParameterNode):
         except OSError as error:
             self.get_logger().warning(f'{file} is not attached to the run: {error}.')
 
-    def stop(self) -> str:
-        """Finish the run, with everything that has arrived; a sentence about it."""
+    def stop(self) -> Answer:
+        """Finish the run, with everything that has arrived."""
         if self._writer is None:
-            return 'Nothing is being recorded.'
+            return _NOTHING
         for topic in self._topics.values():
             topic.end()
         self._tell()
@@ -163,10 +164,25 @@ class RecorderNode(ParameterNode):
             writer.close()
         except OSError as error:
             self._failure = f'The end of {writer.folder} is not on disk: {error}.'
-            return self._failure
+            return Answer(done=False, message=self._failure)
         lost = sum(map(self.lost_of, self._topics))
         count = sum(map(self.messages_of, self._topics))
-        return f'{writer.folder} holds {count} messages, and {lost} were lost on the way.'
+        said = f'{writer.folder} holds {count} messages, and {lost} were lost on the way.'
+        return Answer(done=True, message=said)
+
+    def split(self) -> Answer:
+        """Go on in a new file of the run.
+
+        Raises:
+            RecordingFailedError: If the disk takes no more, which ends the node.
+        """
+        if self._writer is None:
+            return _NOTHING
+        try:
+            self._writer.split()
+        except OSError as error:
+            self._fail(error)
+        return Answer(done=True, message='Going on in a new file.')
 
     def destroy_node(self) -> None:
         """Finish the run before the node goes.
@@ -177,8 +193,8 @@ class RecorderNode(ParameterNode):
         failed = False
         # Kilted destroys nodes, too, that were refused half-made.
         if getattr(self, '_writer', None) is not None:
-            said = self.stop()
-            failed = bool(self._failure)
+            done, said = self.stop()
+            failed = not done
             (self.get_logger().error if failed else self.get_logger().info)(said)
         super().destroy_node()
         if failed:
@@ -281,32 +297,6 @@ class RecorderNode(ParameterNode):
             self._writer = None
         self._report()
         raise RecordingFailedError(said) from None
-
-    def _on_start(self, _request: Any, response: Any) -> Any:
-        try:
-            response.message = f'Recording into {self.start()}.'
-            response.success = True
-        except LatheChatterError as error:
-            response.success, response.message = False, str(error)
-        return response
-
-    def _on_stop(self, _request: Any, response: Any) -> Any:
-        recorded = self._writer is not None
-        response.message = self.stop()
-        response.success = recorded and not self._failure
-        return response
-
-    def _on_split(self, _request: Any, response: Any) -> Any:
-        response.success = self._writer is not None
-        response.message = 'Going on in a new file.'
-        if self._writer is None:
-            response.message = self.stop()
-            return response
-        try:
-            self._writer.split()
-        except OSError as error:
-            self._fail(error)
-        return response
 
     def _report(self) -> None:
         self._diagnostics.publish([self._status()])

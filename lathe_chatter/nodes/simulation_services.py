@@ -6,9 +6,9 @@ simulator know. STOPPED is paused at time zero; a run that its guard has ended r
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
-from lathe_chatter.nodes.control import Answer, RunState
+from lathe_chatter.nodes.control import Answer, RunState, Simulator
 
 try:
     from simulation_interfaces.msg import Result, SimulationState, SimulatorFeatures
@@ -26,30 +26,6 @@ else:
 
 _MOST_STEPS = 100_000
 """Ticks in one request: more would leave other requests unanswered for too long."""
-
-
-class Simulator(Protocol):
-    """What the services drive; a node of rclpy beside."""
-
-    @property
-    def run_state(self) -> RunState:
-        """Whether simulated time goes on."""
-
-    @property
-    def samples_taken(self) -> int:
-        """0 at time zero."""
-
-    def pause(self, *, pause: bool) -> Answer:
-        """Pause or go on."""
-
-    def step(self, ticks: int = 1) -> Answer:
-        """Make ticks while paused."""
-
-    def reset(self) -> Answer:
-        """Start again at time zero."""
-
-    def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
-        """Create a service."""
 
 
 def offer(simulator: Simulator) -> None:

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from lathe_chatter.recording.completeness import lost_at_the_end
 from lathe_chatter.recording.identity import RECOVERED
-from lathe_chatter.recording.reading.reader import Run, raw_of, read_run
+from lathe_chatter.recording.reading.raw_messages import raw_of
+from lathe_chatter.recording.reading.reader import Run, read_run
 from lathe_chatter.recording.reading.recorded_file import RecordedFile, offers_of
 from lathe_chatter.recording.reading.scan import Damage
 from lathe_chatter.recording.writing.run_files import CLOSED

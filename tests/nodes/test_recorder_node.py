@@ -87,7 +87,7 @@ def test_a_loss_on_the_way_is_counted(
         publisher.publish(Float64(data=float(k)))
     spin_until(lambda: recorder.messages_of('/n') == 1, 'the message that was kept')
     assert recorder.lost_of('/n') == 49
-    assert '49 were lost' in recorder.stop()
+    assert '49 were lost' in recorder.stop().message
 
 
 def test_an_existing_folder_is_refused(start: Start, tmp_path: Path) -> None:

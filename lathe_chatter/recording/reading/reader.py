@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mcap.writer import MCAP0_MAGIC
@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from lathe_chatter.recording.reading.choice import chosen_columns, chosen_range
 from lathe_chatter.recording.reading.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.reading.frames import to_pandas, to_xarray
+from lathe_chatter.recording.reading.raw_messages import Raw, Recorded, raw_of
 from lathe_chatter.recording.reading.recorded_file import Contents, Note, RecordedFile
 from lathe_chatter.recording.reading.run_folder import RunFolder, RunReadError, run_folder
 from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE, Blocks, blocks_of
@@ -28,44 +29,6 @@ __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 _REST = 'What is left of it can be saved by `lathe-chatter recover`.'
 _CHUNKS_AT_ONCE = 16
 """Arrays of a single chunk are so small that calls would cost more than their work."""
-
-
-class Raw(NamedTuple):
-    """A message as it was recorded.
-
-    Attributes:
-        topic: Its name.
-        type: As `std_msgs/msg/Bool`.
-        log_time: When it was received, ns since the epoch.
-        publish_time: When it was published, ns since the epoch.
-        sequence: Its number among those of its publisher; 0 from writers that keep none.
-        data: CDR.
-    """
-
-    topic: str
-    type: str
-    log_time: int
-    publish_time: int
-    sequence: int
-    data: bytes
-
-
-class Recorded(NamedTuple):
-    """A recorded message.
-
-    Attributes:
-        topic: Its name.
-        log_time: When it was received, ns since the epoch.
-        sequence: Its number among those of its publisher.
-        message: As rosbags decodes it.
-        publish_time: When it was published, ns since the epoch.
-    """
-
-    topic: str
-    log_time: int
-    sequence: int
-    message: Any
-    publish_time: int
 
 
 @dataclass(frozen=True)
@@ -302,25 +265,6 @@ def _blocks(file: RecordedFile, topic: str) -> Iterator[Blocks]:
             waiting.clear()
     if waiting:
         yield from blocks_of(joined_messages(waiting))
-
-
-def raw_of(file: RecordedFile, messages: Messages, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
-    """The messages of a chunk that are of some topics, or of any if none is named."""
-    known = file.known
-    chosen = {
-        number: (channel.topic, known.schemas[channel.schema_id].name)
-        for number, channel in known.channels.items()
-        if (not topics or channel.topic in topics) and channel.schema_id in known.schemas
-    }
-    for place in np.flatnonzero(np.isin(messages.heads['channel'], list(chosen))):
-        head = messages.heads[place]
-        yield Raw(
-            *chosen[int(head['channel'])],
-            int(head['log_time']),
-            int(head['publish_time']),
-            int(head['sequence']),
-            messages.payload(int(place)),
-        )
 
 
 def _begins_as_mcap(path: Path) -> bool:
