@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.detection import ledger as ledgers
-from lathe_chatter.detection.advice import Advice, advise, rule_of_thumb
+from lathe_chatter.detection.adviser import Adviser, Identified
 from lathe_chatter.detection.hops import HopFigures, take_hops
 from lathe_chatter.detection.identification import WINDOW_SIZE, mechanics_of
 from lathe_chatter.detection.intake import Break, Hops, Intake, Rate
@@ -22,10 +22,6 @@ _DECAY = 32.0
 """Of the resonators, 1/s: as narrow as the growth of chatter allows."""
 _HOP = 0.01
 """Length of a hop, about, s: what is judged together, against the decay of the resonators."""
-_CLEAR_CONTACT = 0.15
-"""Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
-_ADVISED_AT = (0, 10, 30)
-"""Hops after the alarm at which a speed is recommended, each time with a better estimate."""
 
 
 class ChatterDetector:
@@ -58,6 +54,7 @@ class ChatterDetector:
         """Begin with nothing known."""
         self._machine = machine
         self._speed_range = speed_range
+        self._adviser = Adviser(machine, speed_range)
         self._smallest = smallest_amplitude
         self._forced = forced_amplitude
         self._strictness = strictness
@@ -94,7 +91,7 @@ class ChatterDetector:
 
     def _forget(self) -> None:
         self._estimate = Estimate()
-        self._advice, self._advice_error = Advice(), math.inf
+        self._adviser.forget()
         self._prepared: tuple[float, Mode] | None = None
         self._hop = 1
 
@@ -175,9 +172,10 @@ class ChatterDetector:
                 self._ledger,
             )
             if flags[ledgers.ALARMED] == 0:
-                self._advice, self._advice_error = Advice(), math.inf
-            elif int(flags[ledgers.SINCE_ALARM]) in _ADVISED_AT:
-                self._advise()
+                self._adviser.forget()
+            elif self._adviser.is_asked(since := int(flags[ledgers.SINCE_ALARM])):
+                modelled = self._mode is Mode.FULL
+                self._adviser.consider(self._identified(), since, modelled=modelled)
         self._estimate = self._told(float(hops.times[-1]))
 
     def _speed(self) -> float:
@@ -185,32 +183,16 @@ class ChatterDetector:
         speed = float(self._ledger.speeds[0])
         return speed if self._mode.sees_spindle else math.nan
 
-    def _seated(self) -> bool | None:
-        """Whether the bearing carries throughout, or not at all."""
-        if self._machine is None:
-            return None
-        stiffness = float(self._ledger.numbers[ledgers.FIGURE_STIFFNESS])
-        open_ = self._machine.workpiece_stiffness(seated=False)
-        part = (stiffness - open_) / max(self._machine.bearing_stiffness, 1e-9 * open_)
-        if abs(part) < _CLEAR_CONTACT:
-            return False
-        return True if abs(part - 1.0) < _CLEAR_CONTACT else None
-
-    def _advise(self) -> None:
-        numbers = self._ledger.numbers
-        rpm = 60.0 * self._speed()
-        if self._machine is not None and self._mode is Mode.FULL:
-            error = float(numbers[ledgers.FIGURE_ERROR])
-            if error >= self._advice_error:
-                return  # where the tool leaves the cut, C w looks less than it is
-            self._advice_error = error
-            cutting = float(numbers[ledgers.FIGURE_CUTTING])
-            self._advice = advise(
-                self._machine, cutting, self._speed_range, rpm, seated=self._seated()
-            )
-        else:
-            frequency = float(numbers[ledgers.FIGURE_OMEGA]) / (2.0 * math.pi)
-            self._advice = rule_of_thumb(frequency, self._speed_range)
+    def _identified(self) -> Identified:
+        numbers = self._ledger.numbers.tolist()
+        return Identified(
+            numbers[ledgers.FIGURE_GROWTH],
+            numbers[ledgers.FIGURE_ERROR],
+            numbers[ledgers.FIGURE_OMEGA] / (2.0 * math.pi),
+            60.0 * self._speed(),
+            numbers[ledgers.FIGURE_CUTTING],
+            numbers[ledgers.FIGURE_STIFFNESS],
+        )
 
     def _told(self, time: float) -> Estimate:
         numbers, flags = self._ledger.numbers.tolist(), self._ledger.flags
@@ -234,5 +216,5 @@ class ChatterDetector:
             engaged,
             numbers[ledgers.RATIO],
             numbers[ledgers.SCORE],
-            self._advice,
+            self._adviser.advice,
         )

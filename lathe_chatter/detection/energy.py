@@ -27,6 +27,7 @@ from lathe_chatter.detection.ledger import (
     RATIO,
     RISE,
     SEEN,
+    SINCE_ALARM,
     SINCE_JUMP,
     STEPPED,
     USUAL,
@@ -199,6 +200,8 @@ def follow_speed(ledger: Ledger, speed: float, hops_a_turn: float) -> None:
         flags[RAMPING] -= 1
         if flags[RAMPING] == 0 and flags[ALARMED] == 0:
             restart_baseline(ledger)
+        elif flags[RAMPING] == 0:
+            flags[SINCE_ALARM] = -1  # another cut: what is known of it begins with the next hop
     if oldest > 0.0 and abs(speed / oldest - 1.0) > _RAMP:
         flags[RAMPING] = int(_RAMP_HOLD + hops_a_turn)
 
