@@ -27,6 +27,7 @@ from lathe_chatter.detection.ledger import (
     HOPS,
     IDLE,
     SEEN,
+    HOLDING,
     SINCE_ALARM,
     STATE,
     USUAL,
@@ -114,6 +115,7 @@ def take_hops(
     noise, known, told = np.zeros(NOISE_SIZE), np.zeros(4), np.zeros(6)
     turns = kernels.poles ** (hop // reading[THINNING])
     centres = np.angle(kernels.poles) * (figures[_RATE] / reading[THINNING])
+    lengths = WINDOWS.copy()
     while done < count:
         samples = block[done * hop : (done + 1) * hop]
         done += 1
@@ -140,8 +142,10 @@ def take_hops(
             noise_sums(kernels.spill, tool * share, workpiece * share, thinned / speed, noise)
             known[0], known[1] = 1.0 / speed, ledger.numbers[USUAL]
             known[2], known[3] = guess[1].real, guess[2].real
+            # The hop of a jump has two cuts in it, the one after it only the new one.
+            lengths[0] = 1 if ledger.flags[HOLDING] == 1 else WINDOWS[0]
             identify(
-                products, newest, WINDOWS, mechanics, noise, known, guess[0], guess[3], windows
+                products, newest, lengths, mechanics, noise, known, guess[0], guess[3], windows
             )
             if ledger.flags[SEEN] % _GUESS_EVERY == 0:
                 reference = windows[_REFERENCE]
