@@ -24,10 +24,10 @@ from lathe_chatter.detection.judgement import judge
 from lathe_chatter.detection.kernels import Complex, Kernels
 from lathe_chatter.detection.ledger import (
     ALARMED,
+    HOLDING,
     HOPS,
     IDLE,
     SEEN,
-    HOLDING,
     SINCE_ALARM,
     STATE,
     USUAL,
