@@ -1,0 +1,80 @@
+"""A node that listens to the measured ones, and notes when what it hears was sent."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float64MultiArray
+
+from lathe_chatter.continuity import Continuity
+from lathe_chatter.nodes.messages import samples_from_message
+from lathe_chatter.nodes.running import make_executor
+
+DEEP = QoSProfile(depth=5000)
+
+
+class Ear:
+    """A node that notes what comes and when it was sent."""
+
+    def __init__(self) -> None:
+        """Begin deaf."""
+        self.node = Node('benchmark')
+        self.executor = make_executor(self.node, by_events=False)
+        self.executor.add_node(self.node)
+        self.heard = Continuity()
+        self.sent: list[int] = []
+        self.ends: list[float] = []
+
+    def listen_to_samples(self, topic: str = '/lathe/samples') -> None:
+        """Note every block of samples from now on."""
+        self.node.create_subscription(Float64MultiArray, topic, self._note, DEEP)
+
+    def _note(self, message: Float64MultiArray, info: dict[str, int]) -> None:
+        samples, _columns = samples_from_message(message)
+        self.heard.join(samples[:, 0])
+        self.sent.append(info['source_timestamp'])
+        self.ends.append(float(samples[-1, 0]))
+
+    def spin(self, until: Callable[[], object] = lambda: False, limit: float = 30.0) -> None:
+        """Listen until something holds, `limit` s at most."""
+        end = time.monotonic() + limit
+        while time.monotonic() < end and not until():
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def wait_for_samples(self) -> None:
+        """Wait until a lathe cuts."""
+        self.spin(lambda: len(self.sent) > 500)
+        if not self.sent:
+            sys.exit('no lathe came up')
+
+    def close(self) -> None:
+        """End the node."""
+        self.executor.remove_node(self.node)
+        self.node.destroy_node()
+
+
+@contextlib.contextmanager
+def ear() -> Iterator[Ear]:
+    """An `Ear` that is closed at the end."""
+    listener = Ear()
+    try:
+        yield listener
+    finally:
+        listener.close()
+
+
+def wait_for_node(name: str) -> None:
+    """Wait until a node is found, and for one second of its life."""
+    with ear() as listener:
+        listener.spin(lambda: name in [n.replace('//', '/') for n in names(listener.node)])
+        listener.spin(limit=1.0)
+
+
+def names(node: Node) -> list[str]:
+    """Full names of the nodes of the graph."""
+    return [f'{space}/{name}' for name, space in node.get_node_names_and_namespaces()]
