@@ -29,3 +29,8 @@ class ParameterError(LatheChatterError, ValueError):
 
 class LayoutError(LatheChatterError, ValueError):
     """A block of samples whose layout is not that of the contract."""
+
+
+def reason_of(error: OSError) -> str:
+    """Why the system refused, in its words: without the number and the file, which is known."""
+    return error.strerror or str(error)

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.errors import LatheChatterError, ParameterError, reason_of
 from lathe_chatter.model import Cut
 from lathe_chatter.quantities import Quantity
 
@@ -118,7 +118,15 @@ def load_scenario(path: Path) -> Scenario:
     """
     try:
         raw = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except OSError as error:
+        raise ScenarioError(f'The scenario {path} cannot be read: {reason_of(error)}.') from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else 'its YAML'
+        raise ScenarioError(
+            f'The scenario {path} cannot be read: at {where}, {error.problem}.'
+        ) from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
         reason = ' '.join(str(error).split())
         raise ScenarioError(f'The scenario {path} cannot be read: {reason}.') from None
     if not isinstance(raw, dict):

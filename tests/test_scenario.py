@@ -77,7 +77,8 @@ def test_the_least_that_a_scenario_needs_is_its_duration(tmp_path: Path) -> None
     [
         ('', 'is empty or no mapping'),
         ('[1, 2]', 'is empty or no mapping'),
-        ('a: [', 'cannot be read'),
+        ('a: [', 'cannot be read: at line 1, column 5, '),
+        ('a: \x07', 'cannot be read'),
         ('title: nothing', 'needs duration'),
         ('duration: soon', "duration is 'soon' s"),
         ('duration: -1', 'duration is -1 s'),

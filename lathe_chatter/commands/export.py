@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.export import Selection, seam_sentences, to_csv, to_parquet, unroll
 
@@ -69,7 +69,7 @@ def run(options: Namespace) -> int:
                 recorded, path, chosen, lambda count: progress.advance(bar, count)
             )
         except OSError as error:
-            raise ExportFailedError(f'{path} cannot be written: {error}.') from None
+            raise ExportFailedError(f'{path} cannot be written: {reason_of(error)}.') from None
     for sentence in seam_sentences(done):
         console.print(f'note   {sentence}', markup=False)
     out = Console(highlight=False, soft_wrap=True)

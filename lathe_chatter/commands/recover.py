@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.recording import recover
 
 NAME = 'recover'
@@ -36,7 +36,7 @@ def run(options: Namespace) -> int:
     try:
         saved = recover(path, output)
     except OSError as error:
-        raise RecoverFailedError(f'{output} cannot be written: {error}.') from None
+        raise RecoverFailedError(f'{output} cannot be written: {reason_of(error)}.') from None
     console = Console(highlight=False, soft_wrap=True)
     damage = [*map(str, saved.damage), *saved.lost]
     if options.json:

@@ -14,7 +14,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from rosbags.typesys import Stores, get_typestore
 
 from lathe_chatter.continuity import Joint
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.nodes import recorder_services
 from lathe_chatter.nodes.control import Answer
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
@@ -124,7 +124,9 @@ class RecorderNode(ParameterNode):
                 split_duration=values['split_duration'],
             )
         except OSError as error:
-            raise LatheChatterError(f'The run {folder} cannot be made: {error}.') from None
+            raise LatheChatterError(
+                f'The run {folder} cannot be made: {reason_of(error)}.'
+            ) from None
         self._failure = ''
         self._runs += 1
         self._topics.clear()
@@ -146,7 +148,7 @@ class RecorderNode(ParameterNode):
             if self._writer is not None:
                 self._writer.attach_file(file)
         except OSError as error:
-            self.get_logger().warning(f'{file} is not attached to the run: {error}.')
+            self.get_logger().warning(f'{file} is not attached to the run: {reason_of(error)}.')
 
     def stop(self) -> Answer:
         """Finish the run, with everything that has arrived."""
@@ -163,7 +165,7 @@ class RecorderNode(ParameterNode):
             writer.note(SUMMARY, closing_summary(self._journal, self._noted))
             writer.close()
         except OSError as error:
-            self._failure = f'The end of {writer.folder} is not on disk: {error}.'
+            self._failure = f'The end of {writer.folder} is not on disk: {reason_of(error)}.'
             return Answer(done=False, message=self._failure)
         lost = sum(map(self.lost_of, self._topics))
         count = sum(map(self.messages_of, self._topics))
