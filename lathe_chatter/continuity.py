@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 
+import numpy as np
+
+from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import Array
 
 
@@ -55,3 +59,24 @@ class Continuity:
             self.gaps += 1
             return Joint.GAP
         return Joint.CONTIGUOUS
+
+
+def times_of(samples: Array, columns: Sequence[str]) -> Array:
+    """The times of the samples (n,), s.
+
+    Raises:
+        LayoutError: If there are none, or if they are no numbers or do not increase.
+    """
+    if 'time' not in columns:
+        raise LayoutError(f'The samples have no column time, only {", ".join(columns)}.')
+    times: Array = samples[:, columns.index('time')]
+    # A sensor that is dead is the detector's business: it does without.
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise LayoutError('The times of the samples are not finite, or do not increase.')
+    return times
+
+
+def follow_evenly(times: Array) -> bool:
+    """Whether times (n,) follow each other without a gap or a jump back."""
+    steps = np.diff(times)
+    return steps.size == 0 or bool(0.0 < steps.max() < 1.5 * steps.min())

@@ -17,6 +17,8 @@ _NEAR = 2.0
 _SHARE = 0.98
 """Of the stable depth that is recommended, against what was identified a little wrong."""
 _MOST = 3
+_SAME = 0.02
+"""Part by which speeds may differ that come from one cut, identified twice."""
 _RULE_LEAST, _RULE_MOST = 1, 3
 """Waves a turn that the rule of thumb tries: of more, fewer than half were stable."""
 
@@ -49,6 +51,16 @@ class Advice:
     speeds: tuple[AdvisedSpeed, ...] = ()
     depth_factor: float = math.nan
     depth_speed_rpm: float = math.nan
+
+    def is_news_after(self, told: Advice) -> bool:
+        """Whether it says something, and another thing than what was told before."""
+        if not self.speeds:
+            known = math.isfinite(self.depth_factor)
+            return known and (bool(told.speeds) or not math.isfinite(told.depth_factor))
+        if not told.speeds:
+            return True
+        ratio = self.speeds[0].spindle_speed_rpm / told.speeds[0].spindle_speed_rpm
+        return abs(ratio - 1.0) > _SAME
 
     def in_words(self, depth: float | None = None) -> str:
         """A sentence for the operator; empty where nothing is known.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,9 +15,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
-from lathe_chatter.continuity import Continuity, Joint
-from lathe_chatter.detection import ChatterDetector, Estimate
-from lathe_chatter.errors import LatheChatterError, LayoutError
+from lathe_chatter.continuity import Continuity, Joint, follow_evenly, times_of
+from lathe_chatter.detection import Advice, ChatterDetector, Estimate
+from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.model import Array, Machine
 from lathe_chatter.nodes.asked_machine import AskedMachine
@@ -79,6 +79,7 @@ class MonitorNode(ParameterNode):
         self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
         self._state, self._flag = _UNKNOWN, False
+        self._told_advice = Advice()
         self._figures: Mapping[str, float] = {}
         self._details: Mapping[str, object] = {}
         self._next_report = -math.inf
@@ -140,13 +141,13 @@ class MonitorNode(ParameterNode):
         if not blocks:
             return
         joined = np.concatenate(blocks)
-        even = 'time' in columns and _even(joined[:, columns.index('time')])
+        even = 'time' in columns and follow_evenly(joined[:, columns.index('time')])
         for samples in [joined] if even else blocks:
             self._take(samples, columns)
 
     def _take(self, samples: Array, columns: tuple[str, ...]) -> None:
         try:
-            self._follow(_times(samples, columns))
+            self._follow(times_of(samples, columns))
             estimate = self._detector.update(samples, columns)
         except LatheChatterError as error:
             self._complain(error)
@@ -211,6 +212,10 @@ class MonitorNode(ParameterNode):
                 self.get_logger().warning(onset(estimate))
             else:
                 self.get_logger().info(clearance(estimate))
+            self._told_advice = estimate.advice
+        elif estimate.advice.is_news_after(self._told_advice):
+            self.get_logger().info(f'At {estimate.time:.6f} s: {estimate.advice.in_words()}.')
+            self._told_advice = estimate.advice
         if changed:
             self._diagnostics.publish_changes(self._statuses())
 
@@ -271,27 +276,6 @@ class _Counted(NamedTuple):
 
     samples: int
     lost: int
-
-
-def _times(samples: Array, columns: Sequence[str]) -> Array:
-    """The times of the samples (n,), s.
-
-    Raises:
-        LayoutError: If there are none, or if they are no numbers or do not increase.
-    """
-    if 'time' not in columns:
-        raise LayoutError(f'The samples have no column time, only {", ".join(columns)}.')
-    times: Array = samples[:, columns.index('time')]
-    # A sensor that is dead is the detector's business: it does without.
-    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise LayoutError('The times of the samples are not finite, or do not increase.')
-    return times
-
-
-def _even(times: Array) -> bool:
-    """Whether times (n,) follow each other without a gap or a jump back."""
-    steps = np.diff(times)
-    return steps.size == 0 or bool(0.0 < steps.max() < 1.5 * steps.min())
 
 
 def main() -> None:

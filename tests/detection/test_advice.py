@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from machines import random_machine
 
-from lathe_chatter.detection.advice import Advice, advise, rule_of_thumb
+from lathe_chatter.detection.advice import Advice, AdvisedSpeed, advise, rule_of_thumb
 from lathe_chatter.model import Machine
 from lathe_chatter.stability import critical_depth, rightmost_root, rightmost_roots
 
@@ -60,3 +60,13 @@ def test_the_rule_of_thumb_puts_whole_waves_on_a_turn() -> None:
     assert speeds == pytest.approx([7800.0, 3900.0, 2600.0])
     assert rule_of_thumb(130.0, (3000.0, 7000.0)).speeds[0].spindle_speed_rpm == 3900.0
     assert rule_of_thumb(float('nan'), _RANGE) == Advice()
+
+
+def test_advice_is_news_where_it_says_another_thing() -> None:
+    nothing, less, slower = Advice(), Advice((), 0.8, 3000.0), Advice((AdvisedSpeed(3000.0),))
+    same, faster = Advice((AdvisedSpeed(3010.0),)), Advice((AdvisedSpeed(3600.0),))
+    for told, now in [(nothing, slower), (nothing, less), (slower, faster), (less, slower)]:
+        assert now.is_news_after(told)
+        assert told is nothing or told.is_news_after(now)
+    for told, now in [(nothing, nothing), (less, less), (slower, same), (slower, nothing)]:
+        assert not now.is_news_after(told)

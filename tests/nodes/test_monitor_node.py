@@ -73,6 +73,24 @@ def test_chatter_is_flagged_with_its_figures_and_cured(
     bench.spin_until(lambda: any('died out' in entry.msg for entry in log), 'the other sentence')
 
 
+def test_after_a_speed_that_is_no_cure_another_is_recommended(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    log = bench.listen(Log, '/rosout', LATCHED)
+
+    def told() -> list[float]:
+        return [float(entry.msg.split(' s:')[0][3:]) for entry in log if ' try ' in entry.msg]
+
+    lathe = machine(STABLE)
+    lathe.cut(1.0)
+    lathe.lathe.retune(UNSTABLE)
+    lathe.cut(1.5)
+    bench.spin_until(told, 'a recommendation')
+    lathe.lathe.retune(UNSTABLE.with_changes(spindle_speed_rpm=4300.0))  # its root: +14.3 1/s
+    lathe.cut(1.5)
+    bench.spin_until(lambda: told()[-1] > 2.5, 'another one')
+
+
 def test_a_late_joiner_gets_the_flag_and_the_state(
     machine: Callable[[Cut], Machine], bench: Bench
 ) -> None:
