@@ -25,13 +25,17 @@ def reader(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         pytest.skip('node is not there')
     place = tmp_path_factory.mktemp('node')
     shutil.copy(SCRIPT, place)
-    installed = subprocess.run(
-        [npm, 'install', '--no-audit', '--no-fund', '--prefix', str(place), *PACKAGES],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    install = [npm, 'install', '--no-audit', '--no-fund', '--fetch-retries=1', '--prefix']
+    try:
+        installed = subprocess.run(
+            [*install, str(place), *PACKAGES],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+    except subprocess.TimeoutExpired:
+        pytest.skip('npm could not install it: no registry answered within 60 s')
     if installed.returncode != 0:
         pytest.skip(f'npm could not install it: {installed.stderr.strip()[-200:]}')
     return [node, str(place / SCRIPT.name)]
