@@ -12,10 +12,12 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray
 
 from lathe_chatter.continuity import Continuity
-from lathe_chatter.nodes.messages import samples_from_message
+from lathe_chatter.nodes.drained import Drained
+from lathe_chatter.nodes.messages import BlockReader, samples_from_message
 from lathe_chatter.nodes.running import make_executor
 
 DEEP = QoSProfile(depth=5000)
+_DEEPEST = QoSProfile(depth=20_000)
 
 
 class Ear:
@@ -33,6 +35,21 @@ class Ear:
     def listen_to_samples(self, topic: str = '/lathe/samples') -> None:
         """Note every block of samples from now on."""
         self.node.create_subscription(Float64MultiArray, topic, self._note, DEEP)
+
+    def drain_samples(self, until: float, period: float = 0.01) -> Iterator[None]:
+        """Follow the samples up to a simulated time, s; hands over after each look at them.
+
+        At ten thousand blocks a second a callback for each is too slow.
+        """
+        samples = Drained(self.node, Float64MultiArray, '/lathe/samples', _DEEPEST)
+        reader = BlockReader()
+        while (self.heard.last or 0.0) < until:
+            for serialised, _info in samples.take():
+                block, _columns = reader.read(serialised)
+                self.heard.join(block[:, 0])
+            yield
+            time.sleep(period)
+        samples.end()
 
     def _note(self, message: Float64MultiArray, info: dict[str, int]) -> None:
         samples, _columns = samples_from_message(message)

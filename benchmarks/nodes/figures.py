@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import time
 
@@ -140,17 +141,19 @@ def measure_lathes(seconds: float, most: int = 12) -> None:
 
 def measure_hour(simulated: float, factor: float = 20.0) -> None:
     """Memory and losses in an hour, or so, of simulated time."""
-    with running(LATHE, '-p', f'real_time_factor:={factor}') as lathe, ear() as listener:
-        listener.listen_to_samples()
-        listener.wait_for_samples()
-        began, memory = time.monotonic(), []
-        while listener.ends[-1] < simulated:
-            listener.spin(lambda: listener.ends[-1] >= simulated, limit=10.0)
-            listener.sent.clear()
-            del listener.ends[:-1]
-            memory.append(resident(lathe))
+    arguments = '-p', f'real_time_factor:={factor}', '-p', 'await_readers:=1'
+    with running(LATHE, *arguments) as lathe, ear() as listener:
+        heard, memory = listener.heard, [math.nan]
+        began = look_at = time.monotonic()
+        for _ in listener.drain_samples(simulated):
+            if heard.samples and (now := time.monotonic()) >= look_at:
+                if math.isnan(memory[0]):
+                    memory, began = [], now
+                memory.append(resident(lathe))
+                look_at = now + 1.0
         print(
-            f'{listener.ends[-1]:.0f} s at {listener.ends[-1] / (time.monotonic() - began):.1f} '
-            f'times real time: {memory[0]:.1f} MB resident at first, {memory[-1]:.1f} at last; '
-            f'samples lost {listener.heard.lost}'
+            f'{heard.last:.0f} s at {heard.last / (time.monotonic() - began):.1f} times real '
+            f'time, {heard.samples} samples heard, {heard.lost} lost, '
+            f'{heard.restarts} repeated; {memory[0]:.1f} MB resident at first, '
+            f'{memory[len(memory) // 10]:.1f} after a tenth, {memory[-1]:.1f} at last'
         )
