@@ -70,7 +70,7 @@ class LatheNode(ParameterNode):
         self._lathe = lathe_from(values)
         self._pending: Cut | None = None
         self._topics = LatheTopics(
-            self, values['tick_rate'], publish_clock=values['publish_clock']
+            self, values['tick_rate'], self._factor, publish_clock=values['publish_clock']
         )
         self._record = LatheRecord(self, values)
 

@@ -24,7 +24,9 @@ _SCALARS = {
     '~/workpiece/velocity': SAMPLE_COLUMNS.index('workpiece_velocity'),
 }
 _HISTORY = 4.0
-"""Seconds of ticks that a reader may fall behind before it misses one."""
+"""Seconds, by the clock on the wall, that a reader may fall behind before it misses a tick."""
+_MOST = 10_000
+"""Ticks that are kept at most, where they come faster than in real time."""
 _LOOK_AROUND = 0.01
 """s after which a new listener is noticed."""
 
@@ -39,17 +41,22 @@ class LatheTopics:
     Args:
         node: That they belong to.
         tick_rate: Messages a simulated second, Hz.
+        factor: Simulated seconds per second, 0 for as many as there are.
         publish_clock: Whether /clock is among them.
     """
 
-    def __init__(self, node: Node, tick_rate: float, *, publish_clock: bool) -> None:
+    def __init__(
+        self, node: Node, tick_rate: float, factor: float, *, publish_clock: bool
+    ) -> None:
         """Create the publishers."""
 
         def publisher(kind: Any, topic: str, qos: QoSProfile) -> Publisher:
             options = publisher_overrides(node, topic)
             return node.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
-        deep = max(10, round(_HISTORY * tick_rate))
+        in_real_time = max(10, round(_HISTORY * tick_rate))
+        faster = round(in_real_time * factor) if factor else _MOST
+        deep = max(in_real_time, min(faster, _MOST))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._samples = publisher(Float64MultiArray, '~/samples', kept)
         self._wire = Wire()

@@ -32,8 +32,8 @@ from lathe_chatter.nodes.running import run_node
 from lathe_chatter.nodes.tick_loop import spin_in_ticks
 from lathe_chatter.warm_up import warm_up
 
-_BACKLOG = 2000
-"""Blocks of samples that may wait for the monitor: 4 s of a lathe of 500 ticks a second."""
+_BACKLOG = 10_000
+"""Blocks of samples that may wait for the monitor: 1 s of a lathe at 20 times real time."""
 _AT_ONCE = 400
 """Samples that the detector gets at once, if they wait: 40 ms of a lathe of 10 kHz."""
 _REST = 20_000_000

@@ -17,8 +17,8 @@ from lathe_chatter.nodes.drained import Drained
 from lathe_chatter.recording import Topic
 from lathe_chatter.recording.numbering import Numbering
 
-_BACKLOG = 5000
-"""Messages that may wait here: 10 s of a lathe of 500 ticks a second."""
+_BACKLOG = 10_000
+"""Messages that may wait here: 1 s of a lathe at 20 times real time."""
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 Write = Callable[[str, bytes, int, int, int], None]
