@@ -77,6 +77,8 @@ def times_of(samples: Array, columns: Sequence[str]) -> Array:
 
 
 def follow_evenly(times: Array) -> bool:
-    """Whether times (n,) follow each other without a gap or a jump back."""
-    steps = np.diff(times)
-    return steps.size == 0 or bool(0.0 < steps.max() < 1.5 * steps.min())
+    """Whether times (n,) are numbers that follow each other without a gap or a jump back."""
+    steps = times[1:] - times[:-1]
+    if not steps.size:
+        return bool(np.isfinite(times).all())
+    return bool(0.0 < steps.max() < 1.5 * steps.min())

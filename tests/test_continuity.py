@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from lathe_chatter.continuity import Continuity, Joint
+from lathe_chatter.continuity import Continuity, Joint, follow_evenly, times_of
+from lathe_chatter.errors import LayoutError
 from lathe_chatter.model import Array
 
 RATE = 1e4
@@ -54,3 +57,33 @@ def test_a_block_that_comes_twice_is_no_loss() -> None:
     heard.join(times(0, 20))
     assert heard.join(times(0, 20)) is Joint.RESTART
     assert heard.lost == 0
+
+
+@pytest.mark.parametrize(
+    ('given', 'even'),
+    [
+        ([], True),
+        ([2.0], True),
+        ([math.nan], False),
+        ([0.1, 0.2, 0.3], True),
+        ([0.1, 0.2, 0.4], False),  # one is missing
+        ([0.1, 0.2, 0.2], False),
+        ([0.3, 0.2, 0.1], False),
+        ([0.1, math.nan, 0.3], False),
+        ([0.1, 0.2, math.inf], False),
+    ],
+)
+def test_times_follow_evenly_or_not(given: list[float], even: bool) -> None:
+    assert follow_evenly(np.array(given)) is even
+
+
+@pytest.mark.parametrize('given', [[0.1, math.nan], [0.1, math.inf], [0.2, 0.1], [0.1, 0.1]])
+def test_times_that_are_none_are_refused(given: list[float]) -> None:
+    samples = np.array([[0.0, time] for time in given])
+    with pytest.raises(LayoutError, match='not finite, or do not increase'):
+        times_of(samples, ('tool_displacement', 'time'))
+
+
+def test_samples_without_times_are_refused() -> None:
+    with pytest.raises(LayoutError, match='no column time, only tool_displacement'):
+        times_of(np.zeros((3, 1)), ('tool_displacement',))

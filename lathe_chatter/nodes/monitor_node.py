@@ -36,9 +36,11 @@ _BACKLOG = 10_000
 """Blocks of samples that may wait for the monitor: 1 s of a lathe at 20 times real time."""
 _AT_ONCE = 400
 """Samples that the detector gets at once, if they wait: 40 ms of a lathe of 10 kHz."""
-_REST = 20_000_000
+_REST = 40_000_000
 """ns that the node lets samples come in before it looks at them together."""
-_SERVE_PERIOD = 100_000_000
+_REST_ON_WATCH = 10_000_000
+"""ns, likewise, while the vibration grows: an alarm may be due."""
+_SERVE_PERIOD = 200_000_000
 """ns from one look for requests to the next: a look costs more than the samples of a rest."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
@@ -104,7 +106,7 @@ class MonitorNode(ParameterNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._wake_at = time.monotonic_ns()
         if by_timer:
-            self.create_timer(_REST / 1e9, self.wake, clock=steady)
+            self.create_timer(_REST_ON_WATCH / 1e9, self.wake, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
 
     # -- listening -------------------------------------------------------------------------
@@ -118,7 +120,8 @@ class MonitorNode(ParameterNode):
 
     def wake(self) -> None:
         """Take the blocks that have come."""
-        self._wake_at = time.monotonic_ns() + _REST
+        rest = _REST_ON_WATCH if self._state == 'watch' else _REST
+        self._wake_at = time.monotonic_ns() + rest
         blocks: list[Array] = []
         names: tuple[str, ...] = ()
         count = 0
@@ -141,13 +144,17 @@ class MonitorNode(ParameterNode):
         if not blocks:
             return
         joined = np.concatenate(blocks)
-        even = 'time' in columns and follow_evenly(joined[:, columns.index('time')])
-        for samples in [joined] if even else blocks:
+        if 'time' in columns:
+            times = joined[:, columns.index('time')]
+            if follow_evenly(times):
+                self._take(joined, columns, times)
+                return
+        for samples in blocks:
             self._take(samples, columns)
 
-    def _take(self, samples: Array, columns: tuple[str, ...]) -> None:
+    def _take(self, samples: Array, columns: tuple[str, ...], times: Array | None = None) -> None:
         try:
-            self._follow(times_of(samples, columns))
+            self._follow(times_of(samples, columns) if times is None else times)
             estimate = self._detector.update(samples, columns)
         except LatheChatterError as error:
             self._complain(error)
@@ -199,7 +206,8 @@ class MonitorNode(ParameterNode):
         """Publish what is new, the figures before the flag that they explain."""
         changed = estimate.state != self._state or estimate.chatter != self._flag
         if changed or estimate.time >= self._next_report:
-            self._next_report = estimate.time + _REPORT_PERIOD
+            if math.isfinite(estimate.time):  # not before the first hop
+                self._next_report = (estimate.time // _REPORT_PERIOD + 1.0) * _REPORT_PERIOD
             self._publish_figures(estimate)
         if estimate.state != self._state:
             self._state = estimate.state
