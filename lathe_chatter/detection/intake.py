@@ -75,7 +75,7 @@ class Intake:
         self._last = math.nan
         self._dead: NDArray[np.bool_] = np.zeros(4, bool)
         self._names: tuple[str, ...] = ()
-        self._places = np.zeros(4, np.int64)
+        self._places, self._lacking = np.zeros(4, np.int64), False
 
     def take(self, samples: Array, columns: Sequence[str]) -> Iterator[Break | Rate | Hops]:
         """What a batch of samples (n, k) brings.
@@ -108,7 +108,8 @@ class Intake:
             taken = whole - whole % self.hop
             if taken:
                 self._last = float(rows[taken - 1, 0])
-                block = np.where(self._dead[1:], 0.0, rows[:taken, 1:])
+                block = rows[:taken, 1:].copy()
+                block[:, self._dead[1:]] = 0.0
                 yield Hops(rows[:taken, 0], block)
             rows = rows[taken:]
             if not broken:
@@ -126,7 +127,7 @@ class Intake:
         self._dead = np.asarray(~np.isfinite(first).any(axis=0))
         if self._dead[2] and not self._dead[3]:
             # The workpiece's sensor alone stands for the tool's.
-            self._places[2], self._places[3] = self._places[3], -1
+            self._places[2], self._places[3], self._lacking = self._places[3], -1, True
             rows[:, 2], rows[:, 3] = rows[:, 3], math.nan
             self._dead[2:] = False, True
         usable = self._step > 0.0 and not self._dead[2]
@@ -166,13 +167,14 @@ class Intake:
                 )
             if places[2] < 0:
                 places[2], places[3] = places[3], -1
-            self._places = np.array(places)
+            self._places, self._lacking = np.array(places), min(places) < 0
         if samples.ndim != 2 or samples.shape[1] != len(names):
             raise LayoutError(
                 f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
             )
-        found: Array = samples[:, self._places]
-        found[:, self._places < 0] = math.nan
+        found: Array = samples.take(self._places, axis=1)
+        if self._lacking:
+            found[:, self._places < 0] = math.nan
         return found
 
 

@@ -41,7 +41,7 @@ class Mode(str, Enum):
     @property
     def sees_spindle(self) -> bool:
         """Whether the spindle speed is known."""
-        return self not in {Mode.NO_SPINDLE, Mode.WAITING}
+        return self is not Mode.NO_SPINDLE and self is not Mode.WAITING
 
 
 @dataclass(frozen=True)
