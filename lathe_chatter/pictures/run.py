@@ -9,7 +9,7 @@ import numpy as np
 
 from lathe_chatter.changes import on_the_shop_floor
 from lathe_chatter.history import History
-from lathe_chatter.model import BearingContact
+from lathe_chatter.model import Array, BearingContact
 from lathe_chatter.moments import moments_of
 from lathe_chatter.pictures.moment import draw_portrait, draw_section, draw_spectrum
 from lathe_chatter.pictures.path import bearings_of, draw_path
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _LABEL_WIDTH = 0.12
 """Of the picture, that a label above it takes."""
+_SILENCE = 0.2
+"""s between two figures of the monitor from which on they are not joined: it knew none."""
 _BODIES = (('tool', TOOL), ('workpiece', WORKPIECE))
 
 
@@ -108,7 +110,8 @@ def _draw_rates(axes: Axes, history: History) -> None:
     known = history.estimates.get('growth_rate')
     low, high = min(rates), max(rates)
     if known is not None and known.shape[1]:
-        axes.plot(known[0], known[1], color=NEUTRAL, lw=1.0, label='monitor')
+        times, growth = apart(known, _SILENCE)
+        axes.plot(times, growth, color=NEUTRAL, lw=1.0, marker='.', ms=1.5, label='monitor')
         spread = np.nanpercentile(known[1], [2, 98])
         low, high = min(low, spread[0]), max(high, spread[1])
     margin = 0.15 * max(high - low, 1.0)
@@ -117,6 +120,12 @@ def _draw_rates(axes: Axes, history: History) -> None:
     axes.legend(loc='upper left', frameon=False, ncols=2, fontsize=9)
     axes.set_ylabel('growth rate / s$^{-1}$')
     axes.set_xlabel('simulated time / s')
+
+
+def apart(series: Array, silence: float) -> Array:
+    """A series (2, m) with a nan wherever nothing came for longer than `silence`."""
+    gaps = np.flatnonzero(np.diff(series[0]) > silence) + 1
+    return np.insert(series, gaps, np.nan, axis=1)
 
 
 def _mark(axes: Axes, history: History) -> None:
