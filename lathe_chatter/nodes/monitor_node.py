@@ -8,34 +8,27 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from std_msgs.msg import Bool, Float64, Float64MultiArray, String
+from std_msgs.msg import Bool, Float64, String
 
-from lathe_chatter.continuity import Continuity, Joint, follow_evenly, times_of
+from lathe_chatter.continuity import Continuity, Joint, times_of
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe_parameters import machine_from
 from lathe_chatter.model import Array, Machine
 from lathe_chatter.nodes.asked_machine import AskedMachine
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from lathe_chatter.nodes.drained import Drained
-from lathe_chatter.nodes.messages import BlockReader
 from lathe_chatter.nodes.monitor_words import clearance, details, onset
 from lathe_chatter.nodes.overrides import publisher_overrides
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.running import run_node
+from lathe_chatter.nodes.sample_feed import Fed, SampleFeed
 from lathe_chatter.nodes.tick_loop import spin_in_ticks
 from lathe_chatter.warm_up import warm_up
 
-_BACKLOG = 10_000
-"""Blocks of samples that may wait for the monitor: 1 s of a lathe at 20 times real time."""
-_AT_ONCE = 400
-"""Samples that the detector gets at once, if they wait: 40 ms of a lathe of 10 kHz."""
 _REST = 40_000_000
 """ns that the node lets samples come in before it looks at them together."""
 _REST_ON_WATCH = 10_000_000
@@ -95,14 +88,7 @@ class MonitorNode(ParameterNode):
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))
         self._state_publisher.publish(String(data=self._state))
-        self._reader = BlockReader()
-        self._samples = Drained(
-            self,
-            Float64MultiArray,
-            'lathe/samples',
-            QoSProfile(depth=_BACKLOG),
-            QoSOverridingOptions.with_default_policies(),
-        )
+        self._feed = SampleFeed(self, self._complain)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._wake_at = time.monotonic_ns()
         if by_timer:
@@ -122,39 +108,16 @@ class MonitorNode(ParameterNode):
         """Take the blocks that have come."""
         rest = _REST_ON_WATCH if self._state == 'watch' else _REST
         self._wake_at = time.monotonic_ns() + rest
-        blocks: list[Array] = []
-        names: tuple[str, ...] = ()
-        count = 0
-        for serialised, _info in self._samples.take():
-            try:
-                samples, columns = self._reader.read(serialised)
-            except LatheChatterError as error:
-                self._complain(error)
-                continue
-            if columns != names or count >= _AT_ONCE:
-                self._take_all(blocks, names)
-                blocks, names, count = [], columns, 0
-            if len(samples):
-                blocks.append(samples)
-                count += len(samples)
-        self._take_all(blocks, names)
+        for fed in self._feed.take():
+            self._take(fed)
 
-    def _take_all(self, blocks: list[Array], columns: tuple[str, ...]) -> None:
-        """Take blocks together where they follow each other evenly, else one by one."""
-        if not blocks:
-            return
-        joined = np.concatenate(blocks)
-        if 'time' in columns:
-            times = joined[:, columns.index('time')]
-            if follow_evenly(times):
-                self._take(joined, columns, times)
-                return
-        for samples in blocks:
-            self._take(samples, columns)
-
-    def _take(self, samples: Array, columns: tuple[str, ...], times: Array | None = None) -> None:
+    def _take(self, fed: Fed) -> None:
+        samples, columns = fed.samples, fed.columns
         try:
-            self._follow(times_of(samples, columns) if times is None else times)
+            if fed.evenly:
+                self._follow(samples[:, columns.index('time')])
+            else:
+                self._follow(times_of(samples, columns))
             estimate = self._detector.update(samples, columns)
         except LatheChatterError as error:
             self._complain(error)

@@ -1,0 +1,221 @@
+"""A lathe that does again what a record tells of it, beside the recorded samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter.changes import BEGINNING_AGAIN, Change, Knock
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe_parameters import cut_from, lathe_from
+from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Integers
+from lathe_chatter.recording.reading.sample_blocks import Blocks
+from lathe_chatter.recording.told import Told
+
+_AT_ONCE = 50_000
+"""Samples that are computed at once where the record has none."""
+
+
+class Difference(NamedTuple):
+    """A sample that is not what the lathe computes.
+
+    Attributes:
+        time: Simulated time of the sample, s.
+        column: The first that differs.
+        recorded: What the run holds.
+        computed: What follows from its parameters and changes.
+    """
+
+    time: float
+    column: str
+    recorded: float
+    computed: float
+
+
+class ReplayError(LatheChatterError):
+    """Something without which the samples cannot be computed; the text says what."""
+
+
+class Replay:
+    """A lathe that does again what is told, sample by sample beside the record.
+
+    Args:
+        told: What the record says of the lathe.
+
+    Attributes:
+        compared: Samples that were equal.
+        whole: Whether the record says of the present act how it began.
+        logged: Whether the record says anything of what happened to the cut.
+        after_gap: Whether samples are missing between the last that was equal and the next.
+    """
+
+    def __init__(self, told: Told) -> None:
+        """Begin as the record says.
+
+        Raises:
+            ReplayError: If it says too little.
+            ParameterError: If it says what no lathe can be.
+        """
+        if not told.parameters:
+            raise ReplayError('The run does not say with what parameters the lathe was started.')
+        self.compared = 0
+        self.after_gap = False
+        self.logged = told.logged
+        self._told = told
+        self._act = -1
+        self._waiting: list[Change | Knock] = []
+        self._parameters = told.parameters
+        self._lathe = lathe_from(told.parameters)
+
+    def _begin(self, published: int) -> None:
+        """Begin the act of a block, at time zero, with the cut that those before it left.
+
+        Args:
+            published: When the block was, ns since the epoch: acts may have passed without one.
+        """
+        acts, cut = self._told.acts, self._lathe.cut
+        for happened in self._waiting:  # no sample came after these
+            cut = _after(cut, happened)
+        self._act += 1
+        while self._act + 1 < len(acts) and acts[self._act + 1].begun <= published:
+            cut = self._started(cut)
+            for happened in acts[self._act].happenings:
+                cut = _after(cut, happened)
+            self._act += 1
+        if self._act >= len(acts):
+            raise ReplayError(
+                'Simulated time goes back, and the record does not say how the lathe began again.'
+            )
+        cut = self._started(cut)
+        values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
+        self._lathe = lathe_from({**self._parameters, **values})
+        self.whole = bool(acts[self._act].beginning)
+        self._waiting = list(acts[self._act].happenings)
+
+    def _started(self, cut: Cut) -> Cut:
+        """The cut at time zero of the present act: as it was, or of a lathe started again."""
+        act = self._told.acts[self._act]
+        if not self._act or act.beginning == BEGINNING_AGAIN:
+            return cut
+        if not act.parameters:
+            raise ReplayError(
+                'The lathe was started a second time, and with what parameters is not recorded.'
+            )
+        self._parameters = act.parameters
+        return cut_from(act.parameters)
+
+    def compare(self, blocks: Blocks) -> Difference | None:
+        """Compare the blocks of some messages with what the lathe does; the first difference.
+
+        Raises:
+            ReplayError: If the lathe cannot follow them; the text says why.
+        """
+        if blocks.columns != SAMPLE_COLUMNS:
+            raise ReplayError('The samples have other columns than this lathe computes.')
+        for samples in self._pieces(blocks):
+            difference = self._compare_piece(samples)
+            if difference is not None:
+                return difference
+            self.compared += len(samples)
+            self.after_gap = False
+        return None
+
+    def _pieces(self, blocks: Blocks) -> Iterator[Array]:
+        """Messages joined as far as their places follow each other; the lathe is at the first."""
+        ends = np.cumsum(blocks.rows)
+        begins = ends - blocks.rows
+        places = _places(blocks, self._lathe.sample_rate)
+        breaks = np.flatnonzero(places[1:] != places[:-1] + blocks.rows[:-1]) + 1
+        for first, last in _spans(len(places), breaks):
+            self._go_to(int(places[first]), int(blocks.publish_times[first]))
+            yield blocks.samples[begins[first] : ends[last]]
+
+    def _go_to(self, place: int, published: int) -> None:
+        """Have the lathe where the next sample is number `place`, counted from 0.
+
+        Args:
+            place: Of the sample.
+            published: When it was, ns since the epoch.
+        """
+        if self._act < 0 or place < self._lathe.samples_taken:
+            self._begin(published)
+        while self._lathe.samples_taken < place:
+            self.after_gap = self.compared > 0
+            self._cut(min(place - self._lathe.samples_taken, _AT_ONCE))
+            if self._lathe.guard:
+                raise ReplayError(f'The lathe ends before the samples do. {self._lathe.guard}')
+
+    def _compare_piece(self, samples: Array) -> Difference | None:
+        done = 0
+        while done < len(samples):
+            computed = self._cut(min(len(samples) - done, _AT_ONCE))
+            recorded = np.ascontiguousarray(samples[done : done + len(computed)])
+            wrong = np.argwhere(recorded.view(np.uint64) != computed.view(np.uint64))
+            if len(wrong):
+                row, column = (int(each) for each in wrong[0])
+                self.after_gap = self.after_gap and not done + row
+                self.compared += done + row
+                return Difference(
+                    float(computed[row, 0]),
+                    SAMPLE_COLUMNS[column],
+                    float(recorded[row, column]),
+                    float(computed[row, column]),
+                )
+            done += len(computed)
+            if self._lathe.guard and done < len(samples):
+                raise ReplayError(f'The lathe ends before the samples do. {self._lathe.guard}')
+        return None
+
+    def _cut(self, samples: int) -> Array:
+        """Cut on, at most up to the next change; what is due now happens before."""
+        while self._waiting and self._when(self._waiting[0]) <= self._lathe.samples_taken:
+            self._do(self._waiting.pop(0))
+        if self._waiting:
+            until = self._when(self._waiting[0]) - self._lathe.samples_taken
+            samples = min(samples, until)
+        return self._lathe.advance(samples)
+
+    def _when(self, happened: Change | Knock) -> int:
+        """After how many samples it took effect: changes happen between two samples."""
+        return round(happened.time * self._lathe.sample_rate)
+
+    def _do(self, happened: Change | Knock) -> None:
+        if isinstance(happened, Knock):
+            self._lathe.knock(happened.impulse)
+        else:
+            self._lathe.retune(_after(self._lathe.cut, happened))
+
+
+def _after(cut: Cut, happened: Change | Knock) -> Cut:
+    """A cut after what happened to it."""
+    return cut.with_changes(**happened.new) if isinstance(happened, Change) else cut
+
+
+def _places(blocks: Blocks, sample_rate: float) -> Integers:
+    """The number of the first sample of each message, by the times of all of its samples.
+
+    One altered time among them does not lead astray.
+    """
+    numbers = np.rint(blocks.samples[:, 0] * sample_rate)
+    if len(np.unique(blocks.rows)) == 1:
+        votes = numbers.reshape(len(blocks.rows), -1) - np.arange(1, blocks.rows[0] + 1)
+        found = np.median(votes, axis=1)
+    else:
+        begins = np.cumsum(blocks.rows)[:-1]
+        parts = np.split(numbers, begins)
+        found = np.array([np.median(part - np.arange(1, len(part) + 1)) for part in parts])
+    if not np.isfinite(found).all():
+        raise ReplayError('The times of the samples are no numbers.')
+    places: Integers = np.rint(found).astype(np.int64)
+    return places
+
+
+def _spans(count: int, breaks: Integers) -> Iterator[tuple[int, int]]:
+    """First and last of each stretch between breaks."""
+    edges = [0, *breaks.tolist(), count]
+    for first, after in pairwise(edges):
+        if after > first:
+            yield first, after - 1
