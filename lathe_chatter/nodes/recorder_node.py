@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from datetime import datetime
@@ -11,7 +10,6 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.utilities import get_rmw_implementation_identifier
-from rosbags.typesys import Stores, get_typestore
 
 from lathe_chatter.continuity import Joint
 from lathe_chatter.errors import LatheChatterError, reason_of
@@ -21,15 +19,15 @@ from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_snapshots import ParameterSnapshots
 from lathe_chatter.nodes.parameters import RECORDER
-from lathe_chatter.nodes.recorded_topic import RecordedTopic, topic_of
+from lathe_chatter.nodes.recorded_topic import RecordedTopic
 from lathe_chatter.nodes.recording_status import news, recording_status
 from lathe_chatter.nodes.running import run_node
+from lathe_chatter.nodes.topic_watch import TopicWatch
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.closing import SUMMARY, closing_summary
 from lathe_chatter.recording.identity import (
     IDENTITY,
     PARAMETERS,
-    PUBLISHERS,
     RECEPTION,
     STALLS,
     identity,
@@ -70,10 +68,8 @@ class RecorderNode(ParameterNode):
     def __init__(self, **options: Any) -> None:
         """Begin to record, unless `autostart` is false."""
         super().__init__('run_recorder', RECORDER, **options)
-        self._types = get_typestore(Stores.ROS2_JAZZY)
         self._writer: RunWriter | None = None
-        self._topics: dict[str, RecordedTopic] = {}
-        self._refused: set[str] = set()
+        self._watch: TopicWatch | None = None
         self._failure, self._runs = '', 0
         self._journal, self._stalls = Journal(), Stalls()
         self._diagnostics = Diagnostics(self, 'run recorder')
@@ -90,6 +86,11 @@ class RecorderNode(ParameterNode):
     def run(self) -> Path | None:
         """The folder that is being recorded into."""
         return None if self._writer is None else self._writer.folder
+
+    @property
+    def _topics(self) -> dict[str, RecordedTopic]:
+        """What this run has, or the last one had, by full names."""
+        return {} if self._watch is None else self._watch.topics
 
     def messages_of(self, name: str) -> int:
         """How many messages of a topic, by its full name, this run has or the last one had."""
@@ -129,11 +130,9 @@ class RecorderNode(ParameterNode):
             ) from None
         self._failure = ''
         self._runs += 1
-        self._topics.clear()
-        self._refused.clear()
+        self._watch = TopicWatch(self, values['topics'], self._writer, self._write)
         self._journal, self._stalls = Journal(), Stalls()
         self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
-        self._most_publishers: dict[str, int] = {}
         self._snapshots = ParameterSnapshots(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
         self._writer.note(IDENTITY, {**identity(), 'middleware': middleware})
@@ -152,16 +151,14 @@ class RecorderNode(ParameterNode):
 
     def stop(self) -> Answer:
         """Finish the run, with everything that has arrived."""
-        if self._writer is None:
+        if self._writer is None or self._watch is None:
             return _NOTHING
-        for topic in self._topics.values():
-            topic.end()
+        self._watch.end()
         self._tell()
         writer, self._writer = self._writer, None
-        heard = {name: json.dumps(topic.reception()) for name, topic in self._topics.items()}
         stalls = {STALLS: str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
         try:
-            writer.note(RECEPTION, {**heard, **stalls})
+            writer.note(RECEPTION, {**self._watch.reception(), **stalls})
             writer.note(SUMMARY, closing_summary(self._journal, self._noted))
             writer.close()
         except OSError as error:
@@ -205,45 +202,16 @@ class RecorderNode(ParameterNode):
     # -- what comes ------------------------------------------------------------------------
 
     def _look(self) -> None:
-        """Subscribe to wanted topics that have appeared, and follow the others."""
-        if self._writer is None:
-            return
-        wanted: Any = self.values['topics']
-        for name in map(self.resolve_topic_name, wanted):
-            if name in self._refused:
-                continue
-            offers = self.get_publishers_info_by_topic(name)
-            if name in self._topics:
-                self._topics[name].look(offers)
-            elif offers:
-                self._join(name, offers)
-            for offer in offers:
-                self._snapshots.want(offer.node_namespace, offer.node_name)
-            if len(offers) > self._most_publishers.get(name, 0):
-                self._most_publishers[name] = len(offers)
-                counts = {each: str(count) for each, count in self._most_publishers.items()}
-                self._writer.note(PUBLISHERS, counts)
-        self._snapshots.look()
-
-    def _join(self, name: str, offers: list[Any]) -> None:
-        """Record a topic from now on."""
-        topic = topic_of(name, offers, self._types)
-        if topic is None or self._writer is None:
-            self._refused.add(name)
-            self.get_logger().warning(
-                f'{name} is not recorded: its type {offers[0].topic_type} is not known.'
-            )
-            return
-        self._writer.add_topic(topic)
-        self._topics[name] = RecordedTopic(self, topic, offers, self._write)
+        """Follow the graph: topics and nodes that have appeared."""
+        if self._writer is not None and self._watch is not None:
+            self._watch.look(self._snapshots.want)
+            self._snapshots.look()
 
     def _drain(self) -> None:
         """Take what has arrived."""
-        if self._writer is None:
-            return
-        self._stalls.note(time.monotonic())
-        for topic in self._topics.values():
-            topic.drain()
+        if self._writer is not None and self._watch is not None:
+            self._stalls.note(time.monotonic())
+            self._watch.drain()
 
     def _write(
         self, name: str, data: bytes, log_time: int, publish_time: int, number: int
