@@ -189,12 +189,11 @@ class LatheNode(ParameterNode):
         self.get_logger().error(because)
         self._diagnostics.publish(self._statuses())
 
-    def destroy_node(self) -> None:
-        """Finish its own record before the node goes."""
+    def finish(self) -> None:
+        """Finish its own record."""
         record: LatheRecord | None = getattr(self, '_record', None)
         if record is not None:  # Kilted destroys nodes, too, that were refused half-made
             record.close()
-        super().destroy_node()
 
     # -- the cut ---------------------------------------------------------------------------
 

@@ -66,6 +66,16 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
             changed: What the set named, all of one atomic set in one call.
         """
 
+    def finish(self) -> None:
+        """Put on disk what must be kept, before the node goes. Does nothing by itself."""
+
+    def destroy_node(self) -> None:
+        """Finish, and go."""
+        try:
+            self.finish()
+        finally:
+            super().destroy_node()
+
     def announce(self) -> None:
         """Publish every parameter of the table as an event again.
 

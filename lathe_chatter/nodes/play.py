@@ -22,6 +22,8 @@ _START_PATIENCE = 30.0
 """s for the nodes to find each other."""
 _DISCOVERY = 1.5
 """s in which nodes that are there already become known."""
+_SETTLING = 0.3
+"""s in which the graph has heard that nodes have ended."""
 _OURS = {'lathe': 1, 'chatter_monitor': 1, 'run_recorder': 1, 'lathe_operator': 1}
 """How many nodes of each name a run has."""
 _READERS = 3
@@ -64,6 +66,7 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
             try:
                 return _play(operator, spin, file, output, console)
             finally:
+                _let_graph_settle(executor)
                 executor.shutdown()
                 operator.destroy_node()
                 rclpy.try_shutdown()
@@ -107,6 +110,16 @@ def _play(
     if complaints:
         raise RunFailedError(' '.join(complaints))
     return interrupted
+
+
+def _let_graph_settle(executor: SingleThreadedExecutor) -> None:
+    """Wait until nobody is told any more that the nodes of the cell are gone.
+
+    Fast DDS may wait for itself for ever where a participant goes meanwhile (forced_end.py).
+    """
+    until = time.monotonic() + _SETTLING
+    while (left := until - time.monotonic()) > 0.0:
+        executor.spin_once(timeout_sec=left)
 
 
 def _look_around(operator: Operator, spin: Callable[[], None]) -> None:

@@ -183,21 +183,20 @@ class RecorderNode(ParameterNode):
             self._fail(error)
         return Answer(done=True, message='Going on in a new file.')
 
-    def destroy_node(self) -> None:
-        """Finish the run before the node goes.
+    def finish(self) -> None:
+        """Finish the run.
 
         Raises:
             RecordingFailedError: If its end is not on disk.
         """
-        failed = False
         # Kilted destroys nodes, too, that were refused half-made.
-        if getattr(self, '_writer', None) is not None:
-            done, said = self.stop()
-            failed = not done
-            (self.get_logger().error if failed else self.get_logger().info)(said)
-        super().destroy_node()
-        if failed:
-            raise RecordingFailedError(self._failure)
+        if getattr(self, '_writer', None) is None:
+            return
+        done, said = self.stop()
+        if not done:
+            self.get_logger().error(said)
+            raise RecordingFailedError(said)
+        self.get_logger().info(said)
 
     # -- what comes ------------------------------------------------------------------------
 

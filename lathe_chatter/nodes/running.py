@@ -23,13 +23,15 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.forced_end import end_within
+from lathe_chatter.nodes.parameter_node import ParameterNode
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor
 except ImportError:  # an rclpy older than the executor
     EventsExecutor = None
 
-_Node = TypeVar('_Node', bound=Node)
+_Node = TypeVar('_Node', bound=ParameterNode)
 Spin = Callable[[Executor, _Node, Callable[[], bool]], None]
 """Serves a node with an executor until a function says that it is told to end."""
 
@@ -38,6 +40,9 @@ LOOK_UP = 0.1
 
 _DELIVERY = 2.0
 """s that the readers of a node have, at its end, to take what was published last."""
+
+_LETTING_GO = 5.0
+"""s that the middleware has to let go of a node that has finished."""
 
 _START_ERRORS = (
     LatheChatterError,
@@ -86,7 +91,8 @@ def run_node(
 ) -> None:
     """Make a node and spin it until SIGINT, SIGTERM or a shutdown of its context.
 
-    The node is destroyed in every case; `destroy_node` is where it finishes what it has begun.
+    The node is finished and destroyed in every case. Should the middleware not let go of it the
+    process ends all the same, for this is the last that it does.
 
     Args:
         make: Makes the node once rclpy is initialised.
@@ -142,16 +148,29 @@ def _take_no_words(args: list[str], usage: str) -> None:
         )
 
 
-def _finish(node: Node | None) -> None:
+def _finish(node: ParameterNode | None) -> None:
     """End a node, whatever fails on the way, and then rclpy."""
     try:
         if node is not None:
             try:
                 _deliver(node)
             finally:
-                node.destroy_node()
+                node.finish()
     finally:
-        rclpy.try_shutdown()
+        end_within(_LETTING_GO, _exit_code())
+        try:
+            if node is not None:
+                node.destroy_node()
+        finally:
+            rclpy.try_shutdown()
+
+
+def _exit_code() -> int:
+    """What the process ends with as things are: an error is on its way, or none is."""
+    error = sys.exc_info()[1]
+    if error is None:
+        return 0
+    return int(error.code or 0) if isinstance(error, SystemExit) else 1
 
 
 def _deliver(node: Node) -> None:
