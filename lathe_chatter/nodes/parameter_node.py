@@ -66,6 +66,9 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
             changed: What the set named, all of one atomic set in one call.
         """
 
+    def begin(self) -> None:
+        """Begin what has to be finished: called once, when the node is whole."""
+
     def finish(self) -> None:
         """Put on disk what must be kept, before the node goes. Does nothing by itself."""
 

@@ -62,11 +62,10 @@ class RecorderNode(ParameterNode):
 
     Raises:
         ParameterError: If a parameter given at the start is not allowed.
-        RunExistsError: If the folder to make exists.
     """
 
     def __init__(self, **options: Any) -> None:
-        """Begin to record, unless `autostart` is false."""
+        """Make the node; `begin` begins to record."""
         super().__init__('run_recorder', RECORDER, **options)
         self._writer: RunWriter | None = None
         self._watch: TopicWatch | None = None
@@ -79,6 +78,14 @@ class RecorderNode(ParameterNode):
         self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
         self.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
+
+    def begin(self) -> None:
+        """Begin to record, unless `autostart` is false.
+
+        Raises:
+            RunExistsError: If the folder to make exists.
+            LatheChatterError: If it cannot be made.
+        """
         if self.values['autostart']:
             self.start()
 

@@ -107,11 +107,14 @@ def run_node(
     """
     end = _EndSignal()
     node: _Node | None = None
+    begun = False
     try:
         _take_no_words(sys.argv if args is None else ['', *args], usage)
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         end.wait()
+        node.begin()
+        begun = True
         executor = make_executor(node, by_events=by_events)
         if spin is not None:
             spin(executor, node, lambda: end.came)
@@ -120,7 +123,7 @@ def run_node(
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except _START_ERRORS as error:
-        if node is not None:
+        if begun:
             raise
         if end.came:  # the interrupt, raised amid a call into C++, came out as another error
             return

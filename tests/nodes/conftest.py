@@ -82,6 +82,7 @@ def start(context: Context, executor: SingleThreadedExecutor) -> Callable[..., A
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         node = kind(context=context, namespace=namespace, parameter_overrides=overrides)
         executor.add_node(node)
+        node.begin()
         return node
 
     return make
