@@ -33,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
             epilog=f'example: {verb.EXAMPLE}',
         )
         verb.configure(entry)
-        entry.set_defaults(run=verb.run)
+        entry.set_defaults(run=verb.run, usage_of=entry)
     return result
 
 
@@ -56,7 +56,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='replace')  # where the terminal lacks a letter
-    options = parser().parse_args(arguments)
+    options, unknown = parser().parse_known_args(arguments)
+    if unknown:  # argparse itself would show how to give a verb, not its options
+        options.usage_of.error(f'unrecognized arguments: {" ".join(unknown)}')
     try:
         code: int = options.run(options)
     except LatheChatterError as error:

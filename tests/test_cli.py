@@ -45,6 +45,17 @@ def test_a_mistake_is_one_sentence_and_exit_2(
     assert '\n' not in written
 
 
+def test_an_unknown_option_is_refused_with_those_that_the_verb_has(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(['lobes', '--speeds', '1:2'])
+    assert ended.value.code == 2
+    written = capsys.readouterr().err
+    assert '--from RPM' in written
+    assert written.endswith('lathe-chatter lobes: error: unrecognized arguments: --speeds 1:2\n')
+
+
 def test_the_program_starts_without_ros_and_says_its_version(tmp_path: Path) -> None:
     # The core must not need ROS: here any import of it fails.
     (tmp_path / 'rclpy.py').write_text('raise ImportError("not here")\n')

@@ -70,7 +70,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Simulate; 0 if the lathe got to the end and the monitor said what is expected, else 1."""
     scenario = _scenario(options)
-    knocks = [_knock(text) for text in options.knock]
+    knocks = [_knock(text, scenario.duration) for text in options.knock]
     console = Console(stderr=options.json, highlight=False)
     with console.status('Compiling the integrator (once on a machine) ...'):
         warm_up()
@@ -114,8 +114,8 @@ def _scenario(options: Namespace) -> Scenario:
     return replace(scenario, parameters={**scenario.parameters, **given_parameters(options)})
 
 
-def _knock(text: str) -> Knock:
-    """`T:J` as a knock.
+def _knock(text: str, duration: float) -> Knock:
+    """`T:J` as a knock in a run of so many seconds.
 
     Raises:
         ParameterError: If it is none.
@@ -125,7 +125,7 @@ def _knock(text: str) -> Knock:
         at, impulse = float(time_text), float(impulse_text)
     except ValueError:
         raise ParameterError('--knock', text, '', 'T:J, as 1.5:0.002') from None
-    Quantity('time', 's', high=86400.0).check('--knock', at)
+    Quantity('time', 's', high=duration).check('--knock', at)
     Quantity('impulse', 'N s', low=-1e3, high=1e3).check('--knock', impulse)
     return Knock(at, impulse)
 

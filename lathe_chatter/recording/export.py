@@ -6,6 +6,7 @@ Nothing is held at once but some seconds of the run, and every number keeps its 
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -200,8 +201,9 @@ class _Parts:
             if self._progress is not None:
                 self._progress(len(blocks.samples))
         if self.count == 0:
-            start, end = at(self._chosen.start), at(self._chosen.end)
-            raise RunReadError(f'{self._run.path} holds no samples from {start} to {end}.')
+            start, end = self._chosen.start, self._chosen.end
+            until = f'to {at(end)}' if math.isfinite(end) else 'on'
+            raise RunReadError(f'{self._run.path} holds no samples from {at(start)} {until}.')
 
 
 @contextmanager
