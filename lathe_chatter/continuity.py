@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 import numpy as np
@@ -19,7 +19,7 @@ class Joint(str, Enum):
     GAP = 'gap'
     """Samples are missing in between."""
     RESTART = 'restart'
-    """Simulated time has gone back: another run."""
+    """Simulated time has gone back, or the lathe is another: another run."""
 
 
 class Continuity:
@@ -39,10 +39,15 @@ class Continuity:
         self.last: float | None = None
         self._step = 0.0
 
-    def join(self, times: Array) -> Joint:
-        """Join a block by the times of its samples (n,), s, n > 0, evenly spaced.
+    def join(self, times: Array, is_another: Callable[[], bool] = bool) -> Joint:
+        """Join a block to those before.
 
         A gap between the very first block of one sample and the next cannot be told.
+
+        Args:
+            times: Of its samples (n,), s, n > 0, evenly spaced.
+            is_another: Asked where samples are missing: whether these come from another lathe,
+                whose time has passed that of the one before, and none are.
         """
         before, self.last = self.last, float(times[-1])
         self.samples += times.size
@@ -51,7 +56,7 @@ class Continuity:
         if before is None:
             return Joint.FIRST
         missing = round((float(times[0]) - before) / self._step) - 1 if self._step else 0
-        if missing < 0:
+        if missing < 0 or (missing > 0 and is_another()):
             self.restarts += 1
             return Joint.RESTART
         if missing > 0:

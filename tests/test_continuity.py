@@ -87,3 +87,12 @@ def test_times_that_are_none_are_refused(given: list[float]) -> None:
 def test_samples_without_times_are_refused() -> None:
     with pytest.raises(LayoutError, match='no column time, only tool_displacement'):
         times_of(np.zeros((3, 1)), ('tool_displacement',))
+
+
+def test_samples_of_another_lathe_are_not_missing() -> None:
+    heard = Continuity()
+    heard.join(times(0, 100))
+    assert heard.join(times(300, 100), lambda: True) is Joint.RESTART
+    assert heard.join(times(400, 100), lambda: True) is Joint.CONTIGUOUS
+    assert heard.join(times(700, 100), lambda: False) is Joint.GAP
+    assert (heard.restarts, heard.gaps, heard.lost) == (1, 1, 200)

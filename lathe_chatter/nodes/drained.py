@@ -69,6 +69,11 @@ class Drained:
                 return
             yield found
 
+    def publishers(self) -> frozenset[tuple[int, ...]]:
+        """The marks that DDS gives to those that publish the topic."""
+        offers = self._node.get_publishers_info_by_topic(self._subscription.topic_name)
+        return frozenset(tuple(offer.endpoint_gid) for offer in offers)
+
     def end(self) -> None:
         """Unsubscribe."""
         self._node.destroy_subscription(self._subscription)

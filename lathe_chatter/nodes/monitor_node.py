@@ -132,8 +132,9 @@ class MonitorNode(ParameterNode):
     def _follow(self, times: Array) -> None:
         """Notice lost samples and a lathe that has started again."""
         before = self._continuity.last
-        joint = self._continuity.join(times)
+        joint = self._continuity.join(times, self._feed.is_another_lathe)
         if joint in {Joint.FIRST, Joint.RESTART}:
+            self._feed.know_lathe()
             self._since = f'{times[0]:.6f}'
         if joint is Joint.FIRST:
             self.get_logger().info(f'Listening from {self._since} s on.')
@@ -213,6 +214,8 @@ class MonitorNode(ParameterNode):
             self._state = _UNKNOWN
             self._state_publisher.publish(String(data=self._state))
             self.get_logger().info(f'At {self._continuity.last:.6f} s: no samples come any more.')
+        if not silent:
+            self._feed.know_lathe()
         self._diagnostics.publish(self._statuses(silent=silent))
         self._counted = _Counted(self._continuity.samples, self._continuity.lost)
 

@@ -50,6 +50,7 @@ class SampleFeed:
         """Subscribe."""
         self._complain = complain
         self._reader = BlockReader()
+        self._known: frozenset[tuple[int, ...]] = frozenset()
         self._messages = Drained(
             node,
             Float64MultiArray,
@@ -57,6 +58,14 @@ class SampleFeed:
             QoSProfile(depth=_BACKLOG),
             QoSOverridingOptions.with_default_policies(),
         )
+
+    def know_lathe(self) -> None:
+        """Remember who publishes now."""
+        self._known = self._messages.publishers()
+
+    def is_another_lathe(self) -> bool:
+        """Whether somebody publishes who did not when the lathe was last known."""
+        return not self._messages.publishers() <= self._known
 
     def take(self) -> Iterator[Fed]:
         """What has come since, in order."""

@@ -133,6 +133,23 @@ def test_a_lathe_that_starts_again_is_followed(
     bench.spin_until(lambda: not flags[-1].data, 'the end of the flag')
 
 
+def test_another_lathe_is_no_gap_although_its_time_is_later(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    log = bench.listen(Log, '/rosout', LATCHED)
+    diagnostics = bench.listen(DiagnosticArray, '/diagnostics')
+    machine(STABLE).cut(0.1)
+    other = machine(STABLE)
+    other.lathe.advance(5000)  # before it is found
+    other.cut(0.1)
+    sentence = 'At 0.100000 s: the lathe started again, and I with it from 0.500100 s on.'
+    bench.spin_until(lambda: sentence in [entry.msg for entry in log], 'the sentence')
+    bench.spin_until(
+        lambda: value(diagnostics, 'samples', 'restarts of the lathe') == '1', 'the count'
+    )
+    assert value(diagnostics, 'samples', 'samples lost') == '0'
+
+
 def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> None:
     start(MonitorNode)
     flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
