@@ -25,6 +25,9 @@ from lathe_chatter.warm_up import warm_up
 
 PATIENCE = 120.0
 """s: the start of a node takes 20 s where others keep the machine busy."""
+SETTLING = 0.2
+"""s in which DDS hears that processes have ended: Fast DDS may wait for itself for ever where the
+participant of a test goes meanwhile (lathe_chatter/nodes/forced_end.py)."""
 SpinUntil = Callable[..., None]
 
 
@@ -100,4 +103,5 @@ def nodes(domain: int, compiled: None, tmp_path: Path) -> Iterator[NodeProcesses
     started = NodeProcesses(tmp_path)
     yield started
     started.end()
+    time.sleep(SETTLING)
     sys.stdout.write(started.said())
