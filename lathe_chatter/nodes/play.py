@@ -18,8 +18,8 @@ from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameters import LATHE
 from lathe_chatter.scenario import Scenario
 
-_START_PATIENCE = 30.0
-"""s for the nodes to find each other."""
+_START_PATIENCE = 60.0
+"""s for the nodes to find each other: 20 where others keep the machine busy."""
 _DISCOVERY = 1.5
 """s in which nodes that are there already become known."""
 _SETTLING = 0.3
