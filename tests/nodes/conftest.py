@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -25,9 +26,9 @@ from lathe_chatter.warm_up import warm_up
 
 PATIENCE = 120.0
 """s: the start of a node takes 20 s where others keep the machine busy."""
-SETTLING = 0.2
-"""s in which DDS hears that processes have ended: Fast DDS may wait for itself for ever where the
-participant of a test goes meanwhile (lathe_chatter/nodes/forced_end.py)."""
+SETTLING = 0.3
+"""s in which DDS hears that processes have ended: Fast DDS may crash, or wait for itself for ever,
+where the participant of a test goes meanwhile (lathe_chatter/nodes/forced_end.py)."""
 SpinUntil = Callable[..., None]
 
 
@@ -51,11 +52,19 @@ def context(domain: int) -> Iterator[Context]:
 def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
     """Spun by the test itself, so that an exception in a callback fails the test."""
     executor = SingleThreadedExecutor(context=context)
+    processes = _time_of_processes()
     yield executor
+    if _time_of_processes() != processes:
+        time.sleep(SETTLING)
     for node in executor.get_nodes():
         executor.remove_node(node)
         node.destroy_node()
     executor.shutdown()
+
+
+def _time_of_processes() -> float:
+    """Processor time of the processes that this one has started and seen end, s."""
+    return sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
 
 
 @pytest.fixture
@@ -103,5 +112,4 @@ def nodes(domain: int, compiled: None, tmp_path: Path) -> Iterator[NodeProcesses
     started = NodeProcesses(tmp_path)
     yield started
     started.end()
-    time.sleep(SETTLING)
     sys.stdout.write(started.said())
