@@ -41,6 +41,9 @@ LOOK_UP = 0.1
 _DELIVERY = 2.0
 """s that the readers of a node have, at its end, to take what was published last."""
 
+_QUIET = 0.2
+"""s in which a finished node hears of others that ended just before it: Fast DDS may crash where a
+participant goes meanwhile."""
 _LETTING_GO = 5.0
 """s that the middleware has to let go of a node that has finished."""
 
@@ -163,6 +166,7 @@ def _finish(node: ParameterNode | None) -> None:
         end_within(_LETTING_GO, _exit_code())
         try:
             if node is not None:
+                time.sleep(_QUIET)
                 node.destroy_node()
         finally:
             rclpy.try_shutdown()
