@@ -20,12 +20,12 @@ lint:
 	  && $$python -m ruff format --check . && $$python -m mypy
 
 test: lint
-	@python=$$(scripts/environment jazzy test) && $$python -m lathe_chatter.warm_up \
+	@python=$$(scripts/environment jazzy test) && $$python -m lathe_chatter.precompile \
 	  && $$python -m pytest -n 2 --dist loadfile $(ARGS)
 
 # The rest of the tests never import ROS: what passes with Jazzy passes with Kilted.
 test-kilted:
-	@python=$$(scripts/environment kilted test) && $$python -m lathe_chatter.warm_up \
+	@python=$$(scripts/environment kilted test) && $$python -m lathe_chatter.precompile \
 	  && $$python -m pytest -n 2 --dist loadfile tests/nodes tests/commands/test_run.py $(ARGS)
 
 clean:

@@ -52,7 +52,7 @@ setup(
             'lathe = lathe_chatter.nodes.lathe_node:main',
             'chatter_monitor = lathe_chatter.nodes.monitor_node:main',
             'run_recorder = lathe_chatter.nodes.recorder_node:main',
-            'lathe-chatter = lathe_chatter.cli:main',
+            'lathe-chatter = lathe_chatter.cli.main:main',
         ],
     },
 )

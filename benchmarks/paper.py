@@ -31,11 +31,11 @@ from lathe_chatter.knocks import (
     smallest_lasting_knock,
 )
 from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.config import Start
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.paper import PAPER_RUNS, find, reproduce_run
+from lathe_chatter.precompile import precompile
 from lathe_chatter.stability import safe_limit
-from lathe_chatter.start import Start
-from lathe_chatter.warm_up import warm_up
 
 MACHINE = Machine()
 PRINTED = {  # the table of established facts: bearing carries, rev/min, mm
@@ -164,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('parts', nargs='*', choices=[[], *PARTS], metavar='PART')
     parser.add_argument('--json', action='store_true', help='print JSON instead of a table')
     options = parser.parse_args(arguments)
-    warm_up()
+    precompile()
     figures = [figure for part in options.parts or PARTS for figure in PARTS[part]()]
     if options.json:
         print(json.dumps([asdict(figure) for figure in figures], indent=2))

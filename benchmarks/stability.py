@@ -41,8 +41,8 @@ from lathe_chatter.bench.stability import (
 
 sys.path.append(str(Path(__file__).parents[1] / 'tests'))
 
-from machines import random_machine
-from reference import collocation
+from support.machines import random_machine
+from support.reference import collocation
 
 
 def import_time(repeats: int) -> float:

@@ -12,9 +12,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from lathe_chatter import cli
-from lathe_chatter.model import SAMPLE_COLUMNS
+from lathe_chatter.cli import main as cli
 from lathe_chatter.recording import Run, read_run
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 LAYOUTS = Path(__file__).resolve().parents[1] / 'config' / 'layouts'
 SHOWN = {

@@ -16,7 +16,7 @@ from lathe_chatter.stability import critical_depth, rightmost_root, rightmost_ro
 
 sys.path.append(str(Path(__file__).parents[2] / 'tests'))
 
-from machines import random_machine
+from support.machines import random_machine
 
 SLOW, FAST = 1000.0, 12000.0
 _SCAN = 60.0 / np.linspace(60.0 / SLOW, 60.0 / FAST, 300)

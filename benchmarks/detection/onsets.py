@@ -23,7 +23,7 @@ from rivals import HOP, RIVALS
 from scenarios import MACHINE
 from simulator import RATE
 
-from lathe_chatter.model import Array
+from lathe_chatter.arrays import Array
 from lathe_chatter.stability import rightmost_root
 
 ASKED = 2.0

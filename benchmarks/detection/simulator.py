@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import expm
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.model import Array, Machine, Mode
+from lathe_chatter.model import Machine, Mode
 
 RATE = 1e4
 COLUMNS = ('time', 'spindle_angle', 'tool_displacement', 'workpiece_displacement')

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from cases import CHATTER, DURATION, LINEAR, PAPER, RATE, Case, error, exact, located, run
 from figures import Figure, Line, tracked
-from reference.solution import event_error, relative_error
+from support.reference.solution import event_error, relative_error
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import Event
-from lathe_chatter.model import Array
 
 _RAMP = 3e4  # rev/min per s
 _RAMP_ENDS = 4213.0  # rev/min

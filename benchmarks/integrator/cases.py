@@ -14,7 +14,7 @@ from lathe_chatter.model import BearingContact, Cut, Machine
 
 sys.path.append(str(CHECKOUT / 'tests'))
 
-from reference import dop853, solution, taylor
+from support.reference import dop853, solution, taylor
 
 RATE = 1e4
 """Hz: steps of 100 us."""

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from figures import Figure, Line, tracked
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe_sweep import LatheSweep, sample_rate_for
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, BearingContact, Cut
+from lathe_chatter.lathe.sweep import LatheSweep, sample_rate_for
+from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _SPEEDS = np.linspace(2500.0, 3500.0, 4)
 _DEPTHS = np.linspace(0.1e-3, 0.5e-3, 4)

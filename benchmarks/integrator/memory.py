@@ -14,7 +14,7 @@ from pathlib import Path
 from cases import CHATTER
 from figures import Figure, Line, progress
 
-from lathe_chatter.lathe_state import LatheState
+from lathe_chatter.lathe.state import LatheState
 
 _FIRST = 1_000_000
 _BLOCK = 100_000

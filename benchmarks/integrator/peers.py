@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from cases import CHATTER, DURATION, LINEAR, RATE, TOUCHING, Case, by_dop853, error, exact, run
 from figures import Figure, Line, Missing, progress, tracked
-from reference.solution import event_error, relative_error
 from speed import cost
+from support.reference.solution import event_error, relative_error
 
 from lathe_chatter.model import Machine, Mode, paper_initial_state
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from cases import CHATTER, DURATION, LINEAR, RATE, TOUCHING, Case
 from figures import Figure, Line, tracked
 
-from lathe_chatter.integrator import layout
+from lathe_chatter.lathe.integrator import state_layout as layout
 
 _REPEATS = 200
 _SETTLED = 2.0

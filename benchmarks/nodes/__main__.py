@@ -26,7 +26,7 @@ import rclpy
 from processes import machine
 from repeats import repeats
 
-from lathe_chatter.warm_up import warm_up
+from lathe_chatter.precompile import precompile
 
 FIGURES: dict[str, Callable[[Any], None]] = {
     'cpu': lambda options: figures.measure_cpu(options.seconds),
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     unknown = set(options.figures) - set(known)
     if unknown:
         parser.error(f'no such figure: {", ".join(sorted(unknown))}')
-    warm_up()  # what is measured is not how long the machine compiles
+    precompile()  # what is measured is not how long the machine compiles
     with domain_coordinator.domain_id() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         rclpy.init()

@@ -11,10 +11,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray
 
-from lathe_chatter.continuity import Continuity
-from lathe_chatter.nodes.drained import Drained
 from lathe_chatter.nodes.messages import BlockReader, samples_from_message
-from lathe_chatter.nodes.running import make_executor
+from lathe_chatter.nodes.node_main import make_executor
+from lathe_chatter.nodes.polled_subscription import Drained
+from lathe_chatter.samples.continuity import Continuity
 
 DEEP = QoSProfile(depth=5000)
 _DEEPEST = QoSProfile(depth=20_000)

@@ -12,7 +12,7 @@ from runs import START, TICK, block, samples_topic, scratch
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.recording import RunReadError, RunWriter, read_run, recover, verify
-from lathe_chatter.recording.identity import IDENTITY, identity
+from lathe_chatter.recording.provenance import IDENTITY, identity
 
 _BLOCKS, _PER_COMMIT = 1000, 125
 _CHUNK = 6

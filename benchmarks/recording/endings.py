@@ -21,7 +21,7 @@ from rosbags.rosbag2.errors import ReaderError
 from runs import PER_COMMIT, START, TICK, blocks, samples_topic, scratch
 
 from lathe_chatter.recording import RunWriter, recover, verify
-from lathe_chatter.recording.identity import IDENTITY, identity
+from lathe_chatter.recording.provenance import IDENTITY, identity
 
 _LOST = re.compile(r'^/lathe/samples: (\d+) messages that had come are not there')
 _TESTS = Path(__file__).parents[2] / 'tests' / 'recording'

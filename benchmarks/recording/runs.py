@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.arrays import Array
 from lathe_chatter.recording import Topic
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 ARRAY = 'std_msgs/msg/Float64MultiArray'

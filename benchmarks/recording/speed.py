@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from runs import PER_COMMIT, START, TICK, blocks, samples_topic, scratch
 
-from lathe_chatter.model import SAMPLE_COLUMNS
 from lathe_chatter.recording import RunWriter, read_run
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 
 def writing() -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from runs import scratch
 
+from lathe_chatter.precompile import precompile
 from lathe_chatter.recording import verify
-from lathe_chatter.warm_up import warm_up
 
 
 def seconds_of(process: subprocess.Popen[bytes]) -> float:
@@ -25,7 +25,7 @@ def stalls(seconds: float) -> None:
     """What is lost when the recorder stands still 0.3 s in every second."""
     import domain_coordinator
 
-    warm_up()  # or the lathe would compile while it is waited for
+    precompile()  # or the lathe would compile while it is waited for
     with scratch() as place, domain_coordinator.domain_id() as domain:
         environment = {
             **os.environ,

@@ -7,7 +7,8 @@ from functools import partial
 from lathe_chatter.bench.figures import Figure, median_time
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, BearingContact, Cut
+from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _RATE = 1e4
 _BLOCK = 10_000

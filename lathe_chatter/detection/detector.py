@@ -7,15 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lathe_chatter.detection import ledger as ledgers
-from lathe_chatter.detection.adviser import Adviser, Identified
-from lathe_chatter.detection.hops import HopFigures, take_hops
+from lathe_chatter.arrays import Array
+from lathe_chatter.detection import detector_state as ledgers
+from lathe_chatter.detection.advice_timing import Adviser, Identified
+from lathe_chatter.detection.block_loop import HopFigures, take_hops
+from lathe_chatter.detection.framing import Break, Hops, Intake, Rate
 from lathe_chatter.detection.identification import WINDOW_SIZE, mechanics_of
-from lathe_chatter.detection.intake import Break, Hops, Intake, Rate
 from lathe_chatter.detection.kernels import band_of, design, gain, thinning_of
 from lathe_chatter.detection.signals import PRODUCTS_SIZE, READING_SIZE, fresh_memory
 from lathe_chatter.detection.states import STATES, Estimate, Mode
-from lathe_chatter.model import Array, Machine
+from lathe_chatter.model import Machine
 
 _PAPER = Machine()
 _DECAY = 32.0

@@ -13,12 +13,9 @@ import math
 
 import numpy as np
 
+from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.kernels import (
-    BAND_BAND,
-    FORCE_BAND,
-    INERTIA_BAND,
-)
+from lathe_chatter.detection.kernels import BAND_BAND, FORCE_BAND, INERTIA_BAND
 from lathe_chatter.detection.kernels import FORCE_FORCE as SPILL_FORCE
 from lathe_chatter.detection.signals import (
     CHIP_CHIP,
@@ -31,7 +28,7 @@ from lathe_chatter.detection.signals import (
     TOOL_POWER,
     WORKPIECE_WORKPIECE,
 )
-from lathe_chatter.model import Array, Integers, Machine
+from lathe_chatter.model import Machine
 
 # What is known from one window.
 (

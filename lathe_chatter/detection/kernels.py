@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lathe_chatter.model import Array, Machine
+from lathe_chatter.arrays import Array
+from lathe_chatter.model import Machine
 
 Complex = NDArray[np.complex128]
 

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.kernels import Complex, Kernels
-from lathe_chatter.model import Array, Integers
 
 # Rows of the history of thinned samples.
 ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, CHIP, HISTORY_ROWS = range(6)

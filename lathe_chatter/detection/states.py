@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
-from lathe_chatter.detection.advice import Advice
+from lathe_chatter.detection.speed_advice import Advice
 from lathe_chatter.model import Machine
 
 IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = (

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
+from lathe_chatter.lathe.config import Start, start_from
 from lathe_chatter.model import Cut
-from lathe_chatter.start import Start, start_from
 
 _KIND = 'lathe_chatter knock map 1'
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Array, BearingContact, Cut, Machine
+from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.stability import contact_at
 
 SAMPLE_RATE = 1e4

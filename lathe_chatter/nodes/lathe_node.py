@@ -11,23 +11,23 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe_parameters import cut_from, lathe_from
+from lathe_chatter.lathe.parameters import cut_from, lathe_from
 from lathe_chatter.model import Cut
 from lathe_chatter.nodes import control_services, simulation_services
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
-from lathe_chatter.nodes.lathe_meter import LatheMeter
 from lathe_chatter.nodes.lathe_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
+from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.pacing import SECOND, Pacer
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_table import Value
 from lathe_chatter.nodes.parameters import CUT_ROWS, LATHE, samples_per_tick
-from lathe_chatter.nodes.running import run_node
 from lathe_chatter.nodes.scheduling import RealTime, ask_for_short_slices
 from lathe_chatter.nodes.tick_loop import spin_in_ticks
-from lathe_chatter.warm_up import warm_up
+from lathe_chatter.nodes.tick_statistics import LatheMeter
+from lathe_chatter.precompile import precompile
 
 _BUDGET = 5_000_000
 """ns that a node which cuts as fast as it can takes before it looks for requests."""
@@ -66,7 +66,7 @@ class LatheNode(ParameterNode):
             raise ParameterError('publish_clock', 'true', '', allowed)
         self._sample_rate: float = values['sample_rate']
         self._samples_per_tick = samples_per_tick(self._sample_rate, values['tick_rate'])
-        warm_up()  # compiled before the first tick is due
+        precompile()  # compiled before the first tick is due
         self._lathe = lathe_from(values)
         self._pending: Cut | None = None
         self._topics = LatheTopics(

@@ -9,9 +9,15 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from lathe_chatter.changes import BEGINNING, BEGINNING_AGAIN, change_sentence, knock_sentence
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.model import Array, Cut
+from lathe_chatter.lathe.cut_events import (
+    BEGINNING,
+    BEGINNING_AGAIN,
+    change_sentence,
+    knock_sentence,
+)
+from lathe_chatter.model import Cut
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
 from lathe_chatter.recording import LatheRun
 

@@ -13,9 +13,10 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
-from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.arrays import Array
 from lathe_chatter.nodes.messages import Wire, joint_states, time_message
 from lathe_chatter.nodes.overrides import publisher_overrides
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _SCALARS = {
     '~/tool/displacement': SAMPLE_COLUMNS.index('tool_displacement'),

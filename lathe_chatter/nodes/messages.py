@@ -16,8 +16,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _SECOND = 10**9
 _TOOL, _WORKPIECE = 2, 4

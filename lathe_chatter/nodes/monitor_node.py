@@ -13,21 +13,22 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool, Float64, String
 
-from lathe_chatter.continuity import Continuity, Joint, times_of
+from lathe_chatter.arrays import Array
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe_parameters import machine_from
-from lathe_chatter.model import Array, Machine
-from lathe_chatter.nodes.asked_machine import AskedMachine
+from lathe_chatter.lathe.parameters import machine_from
+from lathe_chatter.model import Machine
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from lathe_chatter.nodes.monitor_words import clearance, details, onset
+from lathe_chatter.nodes.monitor_sentences import clearance, details, onset
+from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.overrides import publisher_overrides
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR, ModelSource
-from lathe_chatter.nodes.running import run_node
-from lathe_chatter.nodes.sample_feed import Fed, SampleFeed
+from lathe_chatter.nodes.remote_machine import AskedMachine
+from lathe_chatter.nodes.sample_stream import Fed, SampleFeed
 from lathe_chatter.nodes.tick_loop import spin_in_ticks
-from lathe_chatter.warm_up import warm_up
+from lathe_chatter.precompile import precompile
+from lathe_chatter.samples.continuity import Continuity, Joint, times_of
 
 _REST = 40_000_000
 """ns that the node lets samples come in before it looks at them together."""
@@ -62,7 +63,7 @@ class MonitorNode(ParameterNode):
     def __init__(self, *, by_timer: bool = True, **options: Any) -> None:
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
-        warm_up()  # compiled before the first sample comes
+        precompile()  # compiled before the first sample comes
         source = ModelSource(self.values['model'])
         self.machine: Machine | None = None
         if source is ModelSource.PARAMETERS:

@@ -16,7 +16,7 @@ from typing import Any, TypeGuard
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.quantities import Quantity, check_choice, quantity_of
+from lathe_chatter.model.quantities import Quantity, check_choice, quantity_of
 
 Value = bool | int | float | str | list[str]
 Values = Mapping[str, Value]

@@ -11,11 +11,11 @@ import math
 from enum import Enum
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe_parameters import machine_from
-from lathe_chatter.lathe_setup import SEED, LatheSetup
+from lathe_chatter.lathe.parameters import machine_from
+from lathe_chatter.lathe.setup import SEED, LatheSetup
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.nodes.parameter_table import ParameterTable, Row, Values, rows_of
-from lathe_chatter.quantities import Quantity, limits_of
 
 
 def _derived_machine(given: Values) -> Values:

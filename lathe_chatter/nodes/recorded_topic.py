@@ -13,9 +13,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from lathe_chatter.nodes.drained import Drained
+from lathe_chatter.nodes.polled_subscription import Drained
 from lathe_chatter.recording import Topic
-from lathe_chatter.recording.numbering import Numbering
+from lathe_chatter.recording.sequence_gaps import Numbering
 
 _BACKLOG = 10_000
 """Messages that may wait here: 1 s of a lathe at 20 times real time."""

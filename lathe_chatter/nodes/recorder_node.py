@@ -11,21 +11,20 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from lathe_chatter.continuity import Joint
 from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.nodes import recorder_services
 from lathe_chatter.nodes.control import Answer
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
+from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameter_snapshots import ParameterSnapshots
 from lathe_chatter.nodes.parameters import RECORDER
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
 from lathe_chatter.nodes.recording_status import news, recording_status
-from lathe_chatter.nodes.running import run_node
+from lathe_chatter.nodes.remote_parameters import ParameterSnapshots
 from lathe_chatter.nodes.topic_watch import TopicWatch
 from lathe_chatter.recording import RunWriter
-from lathe_chatter.recording.closing import SUMMARY, closing_summary
-from lathe_chatter.recording.identity import (
+from lathe_chatter.recording.cut_session import Journal
+from lathe_chatter.recording.provenance import (
     IDENTITY,
     PARAMETERS,
     RECEPTION,
@@ -33,8 +32,9 @@ from lathe_chatter.recording.identity import (
     identity,
     parameter_values,
 )
-from lathe_chatter.recording.journal import Journal
-from lathe_chatter.recording.stalls import Stalls
+from lathe_chatter.recording.receive_stalls import Stalls
+from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.samples.continuity import Joint
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""

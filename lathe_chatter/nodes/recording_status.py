@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from lathe_chatter.continuity import Joint
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
-from lathe_chatter.recording.journal import Journal, Seam
-from lathe_chatter.recording.stalls import Stalls
+from lathe_chatter.recording.cut_session import Journal, Seam
+from lathe_chatter.recording.receive_stalls import Stalls
+from lathe_chatter.samples.continuity import Joint
 
 
 def recording_status(

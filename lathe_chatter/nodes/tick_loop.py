@@ -14,7 +14,7 @@ from typing import Protocol
 from rclpy.context import Context
 from rclpy.executors import Executor
 
-from lathe_chatter.nodes.running import LOOK_UP
+from lathe_chatter.nodes.node_main import LOOK_UP
 
 SERVE_PERIOD = 10_000_000
 """ns after which the executor looks for requests that nobody knows of."""

@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from lathe_chatter.nodes.recorded_topic import RecordedTopic, Write, topic_of
 from lathe_chatter.recording import RunWriter
-from lathe_chatter.recording.identity import PUBLISHERS
+from lathe_chatter.recording.provenance import PUBLISHERS
 
 
 class TopicWatch:

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lathe_chatter.model import Array, BearingContact, Machine
+from lathe_chatter.arrays import Array
+from lathe_chatter.model import BearingContact, Machine
 from lathe_chatter.paper.reproduction import SAMPLE_RATE, Literal, paper_lathe, reproduce_literally
 from lathe_chatter.paper.runs import AXES, PAPER_RUNS, PaperRun, run_named
 from lathe_chatter.stability import critical_depth, rightmost_roots

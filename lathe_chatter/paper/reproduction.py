@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import EventKind, VirtualLathe
-from lathe_chatter.model import Array, BearingContact, Machine
+from lathe_chatter.model import BearingContact, Machine
 from lathe_chatter.paper.runs import PaperRun
 from lathe_chatter.stability import rightmost_root
 

@@ -8,15 +8,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.recording.identity import IDENTITY, RECOVERED
+from lathe_chatter.recording.mcap_summary import body_is_sound, read_summary
 from lathe_chatter.recording.metadata import FILE_NAME
-from lathe_chatter.recording.reading.reader import Run
-from lathe_chatter.recording.reading.recorded_file import Note, RecordedFile
-from lathe_chatter.recording.reading.summary import body_is_sound, read_summary
+from lathe_chatter.recording.provenance import IDENTITY, RECOVERED
+from lathe_chatter.recording.run import Run
+from lathe_chatter.recording.run_file import Note, RecordedFile
+from lathe_chatter.recording.split_files import CLOSED
+from lathe_chatter.recording.unfinished_counts import FILE_NAME as UNFINISHED
+from lathe_chatter.recording.unfinished_counts import taken
 from lathe_chatter.recording.verification import Verification
-from lathe_chatter.recording.writing.run_files import CLOSED
-from lathe_chatter.recording.writing.tally import FILE_NAME as UNFINISHED
-from lathe_chatter.recording.writing.tally import taken
 
 
 def check_files(found: Verification) -> None:

@@ -15,14 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError, ParameterError
-from lathe_chatter.model import Array
-from lathe_chatter.recording.reading.frames import UNITS, optional
-from lathe_chatter.recording.reading.reader import Run, RunReadError
-from lathe_chatter.recording.reading.sample_series import Seams, at
+from lathe_chatter.recording.atomic_output import whole_folder
+from lathe_chatter.recording.dataframes import UNITS, optional
 from lathe_chatter.recording.ros_messages import topic_of_type
-from lathe_chatter.recording.writing.whole import whole_folder
-from lathe_chatter.recording.writing.writer import RunWriter
+from lathe_chatter.recording.run import Run, RunReadError
+from lathe_chatter.recording.sample_series import Seams, at
+from lathe_chatter.recording.writer import RunWriter
 
 NUMBER_TYPE = 'std_msgs/msg/Float64'
 _TIME = 'time'

@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.model import Array
-from lathe_chatter.recording.closing import SUMMARY, closing_summary
-from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity, parameter_values
-from lathe_chatter.recording.journal import Journal
-from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.arrays import Array
+from lathe_chatter.recording.cut_session import Journal
+from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
     PARAMETER_EVENT_TYPE,
@@ -21,7 +19,9 @@ from lathe_chatter.recording.ros_messages import (
     samples_bytes,
     topic_of_type,
 )
-from lathe_chatter.recording.writing.writer import RunWriter
+from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""
@@ -92,7 +92,7 @@ class LatheRun:
             self.commit()
 
     def tell(self, sentence: str) -> None:
-        """Write what happened to the cut, a sentence of `lathe_chatter.changes`."""
+        """Write what happened to the cut, a sentence of `lathe_chatter.lathe.cut_events`."""
         logger = self.name.lstrip('/').replace('/', '.')
         self._write('/rosout', log_bytes(logger, sentence, self._stamp()))
 

@@ -7,15 +7,15 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
+from lathe_chatter.recording.atomic_output import whole_folder
 from lathe_chatter.recording.completeness import lost_at_the_end
-from lathe_chatter.recording.identity import RECOVERED
-from lathe_chatter.recording.reading.raw_messages import raw_of
-from lathe_chatter.recording.reading.reader import Run, read_run
-from lathe_chatter.recording.reading.recorded_file import RecordedFile, offers_of
-from lathe_chatter.recording.reading.scan import Damage
-from lathe_chatter.recording.writing.run_files import CLOSED
-from lathe_chatter.recording.writing.whole import whole_folder
-from lathe_chatter.recording.writing.writer import RunWriter, Topic
+from lathe_chatter.recording.mcap_reader import Damage
+from lathe_chatter.recording.provenance import RECOVERED
+from lathe_chatter.recording.raw_messages import raw_of
+from lathe_chatter.recording.run import Run, read_run
+from lathe_chatter.recording.run_file import RecordedFile, offers_of
+from lathe_chatter.recording.split_files import CLOSED
+from lathe_chatter.recording.writer import RunWriter, Topic
 
 _NOT_COPIED = (CLOSED, 'rosbag2')
 """Notes that a writer makes itself."""

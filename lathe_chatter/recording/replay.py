@@ -8,12 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.changes import BEGINNING_AGAIN, Change, Knock
+from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe_parameters import cut_from, lathe_from
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Integers
-from lathe_chatter.recording.reading.sample_blocks import Blocks
-from lathe_chatter.recording.told import Told
+from lathe_chatter.lathe.cut_events import BEGINNING_AGAIN, Change, Knock
+from lathe_chatter.lathe.parameters import cut_from, lathe_from
+from lathe_chatter.model import Cut
+from lathe_chatter.recording.cut_log import Told
+from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import Blocks
 
 _AT_ONCE = 50_000
 """Samples that are computed at once where the record has none."""

@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lathe_chatter.errors import LayoutError, ParameterError
-from lathe_chatter.recording.identity import IDENTITY, core_identity
-from lathe_chatter.recording.reading.reader import Run, RunReadError
-from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.recording.cut_log import told_by
+from lathe_chatter.recording.provenance import IDENTITY, core_identity
 from lathe_chatter.recording.replay import Difference, Replay, ReplayError
-from lathe_chatter.recording.told import told_by
+from lathe_chatter.recording.run import Run, RunReadError
 from lathe_chatter.recording.verify import Finding
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 
 @dataclass

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.arrays import Array
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
+from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 LOG_TYPE = 'rcl_interfaces/msg/Log'
 PARAMETER_EVENT_TYPE = 'rcl_interfaces/msg/ParameterEvent'

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from lathe_chatter.recording.reading.reader import Run
+from lathe_chatter.recording.run import Run
 
 
 class Finding(NamedTuple):

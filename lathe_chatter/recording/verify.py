@@ -17,13 +17,13 @@ from lathe_chatter.recording.completeness import (
     check_order,
     noted,
 )
-from lathe_chatter.recording.identity import PUBLISHERS, RECEPTION, STALLS
-from lathe_chatter.recording.numbering import Numbering
-from lathe_chatter.recording.reading.reader import Run, read_run
-from lathe_chatter.recording.reading.recorded_file import Note, RecordedFile, offers_of
-from lathe_chatter.recording.reading.sample_blocks import SAMPLES_TYPE
-from lathe_chatter.recording.reading.sample_series import Seams, at, missing_in
+from lathe_chatter.recording.provenance import PUBLISHERS, RECEPTION, STALLS
+from lathe_chatter.recording.run import Run, read_run
+from lathe_chatter.recording.run_file import Note, RecordedFile, offers_of
+from lathe_chatter.recording.sample_series import Seams, at, missing_in
+from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification import Finding, SampleCount, Verification
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']
 

@@ -7,12 +7,6 @@ turns roots and lobes into a spindle speed. None needs more than NumPy.
 
 from __future__ import annotations
 
-from lathe_chatter.stability.advice import (
-    CuttingAdvice,
-    SpeedAdvice,
-    recommend_speeds,
-    stable_speed_intervals,
-)
 from lathe_chatter.stability.growth_map import GrowthMap, growth_map
 from lathe_chatter.stability.lobes import (
     LobeBoundary,
@@ -28,6 +22,12 @@ from lathe_chatter.stability.safe_limit import (
     contact_at,
     safe_limit,
     seating_depth,
+)
+from lathe_chatter.stability.speed_search import (
+    CuttingAdvice,
+    SpeedAdvice,
+    recommend_speeds,
+    stable_speed_intervals,
 )
 from lathe_chatter.stability.speed_variation import (
     Floquet,

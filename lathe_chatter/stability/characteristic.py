@@ -22,8 +22,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lathe_chatter.model import Array, Cut, Machine
-from lathe_chatter.quantities import quantity_of
+from lathe_chatter.arrays import Array
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.quantities import quantity_of
 
 Complex: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lathe_chatter.model import Array, Cut, Machine
+from lathe_chatter.arrays import Array
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.stability.characteristic import checked
 from lathe_chatter.stability.roots import rightmost_roots
 from lathe_chatter.stability.safe_limit import safe_limit

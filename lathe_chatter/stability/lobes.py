@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.model import Array, Integers, Machine
-from lathe_chatter.quantities import Quantity
+from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.model import Machine
+from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.stability.characteristic import CharacteristicEquation, Complex, checked
 
 _PHASE_STEP = 0.2

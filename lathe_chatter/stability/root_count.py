@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lathe_chatter.model import Array, Integers, Machine
+from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.model import Machine
 from lathe_chatter.stability.characteristic import (
     CharacteristicEquation,
     Complex,

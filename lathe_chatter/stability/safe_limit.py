@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.model import Array, BearingContact, Cut, Machine
-from lathe_chatter.quantities import Quantity
+from lathe_chatter.arrays import Array
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.stability.characteristic import checked
 from lathe_chatter.stability.lobes import critical_depth, critical_depths
 

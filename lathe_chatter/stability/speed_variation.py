@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.model import Array, Cut, Integers, Machine
+from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.stability.characteristic import CharacteristicEquation, checked
 
 _ORDER = 16

@@ -11,7 +11,8 @@ import pytest
 
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, Cut, Machine
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import rightmost_root
 
 BLOCK = 20

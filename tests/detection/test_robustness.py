@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
-from lathe_chatter.detection.advice import Advice
+from lathe_chatter.detection.speed_advice import Advice
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import critical_depth, rightmost_root
 
 _BATCH = 100

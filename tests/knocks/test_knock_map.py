@@ -8,7 +8,7 @@ import pytest
 
 from lathe_chatter.knocks import KnockGrid, Margin, read_knock_map, run_knock_map
 from lathe_chatter.knocks.knock_map import KnockMapError
-from lathe_chatter.start import Start, start_from
+from lathe_chatter.lathe.config import Start, start_from
 
 GRID = KnockGrid(
     Start(), (3000.0, 3100.0), (0.5e-3, 0.66e-3), (10e-6,), reach=4.0, step=1.4, tolerance=0.2

@@ -16,13 +16,13 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 import domain_coordinator
 import pytest
 import rclpy
-from bench import Bench
-from node_processes import NodeProcesses
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from support.node_bench import Bench
+from support.node_processes import NodeProcesses
 
-from lathe_chatter.warm_up import warm_up
+from lathe_chatter.precompile import precompile
 
 PATIENCE = 120.0
 """s: the start of a node takes 20 s where others keep the machine busy."""
@@ -103,7 +103,7 @@ def start(context: Context, executor: SingleThreadedExecutor) -> Callable[..., A
 @pytest.fixture(scope='session')
 def compiled() -> None:
     """The inner loops are compiled, or else each process would do it for itself."""
-    warm_up()
+    precompile()
 
 
 @pytest.fixture

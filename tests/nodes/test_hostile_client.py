@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bench import Bench, messages_of
-from node_processes import NodeProcesses, Reports, Samples, contiguous
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.qos import HistoryPolicy, QoSProfile
+from support.node_bench import Bench, messages_of
+from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
-from lathe_chatter.changes import parse_change
+from lathe_chatter.lathe.cut_events import parse_change
 
 FLOOD = 10_000
 UNKNOWN_TYPE = 200

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import DEEP, LATCHED, Bench, messages_of
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
@@ -16,13 +15,16 @@ from rclpy.qos import ReliabilityPolicy, qos_profile_parameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
+from support.node_bench import DEEP, LATCHED, Bench, messages_of
 
-from lathe_chatter.changes import Change, parse_change
+from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, BearingContact, Cut
+from lathe_chatter.lathe.cut_events import Change, parse_change
+from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.control import RunState
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_from_message
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 TICK = 20
 SCALARS = {

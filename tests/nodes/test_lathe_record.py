@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import Bench
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Float64
+from support.node_bench import Bench
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.lathe_node import LatheNode

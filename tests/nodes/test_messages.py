@@ -11,8 +11,8 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Float64MultiArray
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.model import SAMPLE_COLUMNS, Array
 from lathe_chatter.nodes.messages import (
     BlockReader,
     Wire,
@@ -22,6 +22,7 @@ from lathe_chatter.nodes.messages import (
     samples_to_message,
     time_message,
 )
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 
 def block(rows: int, width: int, seed: int = 0) -> Array:

@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import LATCHED, Bench
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
+from support.node_bench import LATCHED, Bench
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, BearingContact, Cut
+from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.monitor_node import MonitorNode
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 BLOCK = 200
 STABLE = Cut(bearing_contact=BearingContact.NONE)

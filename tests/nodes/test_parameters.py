@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe_parameters import cut_from, machine_from
+from lathe_chatter.lathe.parameters import cut_from, machine_from
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.nodes.parameter_table import Row
 from lathe_chatter.nodes.parameters import LATHE, MONITOR, samples_per_tick

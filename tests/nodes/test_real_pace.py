@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from bench import Bench
-from node_processes import NodeProcesses, Reports, Samples, contiguous
+from support.node_bench import Bench
+from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
 FACTORS = (0.5, 1.0, 2.0)
 LONG_ENOUGH = 2.0

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import Bench
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
+from support.node_bench import Bench
 
 from lathe_chatter import __version__
 from lathe_chatter.errors import LatheChatterError
@@ -29,7 +29,7 @@ from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.recorder_node import RecorderNode
 from lathe_chatter.recording import read_run, verify
-from lathe_chatter.recording.closing import SUMMARY
+from lathe_chatter.recording.run_summary import SUMMARY
 
 Start = Callable[..., Any]
 KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)

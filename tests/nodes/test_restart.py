@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import LATCHED, Bench
-from node_processes import NodeProcesses, Reports, Samples, contiguous
 from std_msgs.msg import Bool, String
+from support.node_bench import LATCHED, Bench
+from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
 from lathe_chatter.recording import read_run, resimulate, verify
-from lathe_chatter.recording.closing import SUMMARY
-from lathe_chatter.recording.identity import PARAMETERS, lives_in
+from lathe_chatter.recording.provenance import PARAMETERS, lives_in
+from lathe_chatter.recording.run_summary import SUMMARY
 
 CHATTER = ('depth_of_cut:=0.001', 'bearing_contact:=none')
 HEARD = '/chatter_monitor: samples'

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import Bench
 from std_msgs.msg import Float64MultiArray
+from support.node_bench import Bench
 
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import samples_from_message

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from bench import LATCHED, Bench
-from node_processes import NodeProcesses, Reports, Samples, contiguous
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64MultiArray, String
+from support.node_bench import LATCHED, Bench
+from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
 TICK = 0.002
 KEPT = 2000

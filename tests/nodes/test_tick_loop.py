@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from bench import messages_of
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
+from support.node_bench import messages_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
-from lathe_chatter.nodes.running import make_executor
+from lathe_chatter.nodes.node_main import make_executor
 from lathe_chatter.nodes.tick_loop import spin_in_ticks
 
 PATIENCE = 60.0

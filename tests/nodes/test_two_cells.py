@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench import Bench
-from node_processes import NodeProcesses, Reports, Samples, contiguous
 from rcl_interfaces.srv import GetParameters
+from support.node_bench import Bench
+from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
-from lathe_chatter.changes import Change, parse_change
+from lathe_chatter.lathe.cut_events import Change, parse_change
 from lathe_chatter.recording import Run, read_run, verify
-from lathe_chatter.recording.closing import SUMMARY
-from lathe_chatter.recording.identity import PARAMETERS
+from lathe_chatter.recording.provenance import PARAMETERS
+from lathe_chatter.recording.run_summary import SUMMARY
 
 SPEEDS = {'left': 3000.0, 'right': 7500.0}
 NODES = ('lathe', 'chatter_monitor', 'run_recorder')

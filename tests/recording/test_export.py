@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from recording.conftest import NUMBER, STORE
 from rosbags.rosbag2 import Reader
+from support.recorded import NUMBER, STORE
 
-from lathe_chatter.cli import main
+from lathe_chatter.arrays import Array
+from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe_parameters import parameters_of
-from lathe_chatter.model import SAMPLE_COLUMNS, Array
+from lathe_chatter.lathe.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 BLOCKS, ROWS, MISSING = 60, 20, 30
 

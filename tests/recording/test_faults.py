@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
-from recording.conftest import STORE, number, topic
-from recording.reading.test_reader import ARRAY, block
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from support.recorded import ARRAY, STORE, block, number, topic
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Array
 from lathe_chatter.recording import RunReadError, RunWriter, read_run, recover, verify
-from lathe_chatter.recording.identity import PUBLISHERS
+from lathe_chatter.recording.provenance import PUBLISHERS
 
 START = 1_700_000_000_000_000_000
 BLOCKS, PER_COMMIT = 60, 10

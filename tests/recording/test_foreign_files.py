@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
-from recording.conftest import STORE, topic
-from recording.reading.test_reader import ARRAY, block
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
+from support.recorded import ARRAY, STORE, block, topic
 
-from lathe_chatter.cli import main
+from lathe_chatter.arrays import Array
+from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Array
 from lathe_chatter.recording import RunReadError, read_run, recover, verify
 
 START = 1_700_000_000_000_000_000

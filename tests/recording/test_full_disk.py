@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from recording.conftest import STORE, topic
+from support.recorded import STORE, topic
 
 from lathe_chatter.recording import RunWriter, read_run, verify
 

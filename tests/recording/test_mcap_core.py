@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from recording.writing.test_writer import CHILD, values_by_mcap
+from support.recorded import WRITER_CHILD, values_by_mcap
 
 PACKAGES = ('@mcap/core@2.2.2', '@mcap/support@1.1.0')
 SCRIPT = Path(__file__).with_name('read_with_mcap_core.mjs')
@@ -46,7 +46,10 @@ def test_it_reads_what_a_killed_writer_left(reader: list[str], tmp_path: Path) -
     for k, commits in enumerate((1, 7, 60)):
         run = tmp_path / f'run{k}'
         with subprocess.Popen(
-            [sys.executable, '-c', CHILD, str(run)], stdout=subprocess.PIPE, text=True, cwd=TESTS
+            [sys.executable, '-c', WRITER_CHILD, str(run)],
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=TESTS,
         ) as child:
             assert child.stdout is not None
             for _ in range(commits):

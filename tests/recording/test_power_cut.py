@@ -11,15 +11,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from recording.conftest import NUMBER, STORE
 from rosbags.rosbag2 import Reader
+from support.recorded import NUMBER, STORE
 
 from lathe_chatter.recording import read_run
 
 CHILD = """
 import sys, time
 from pathlib import Path
-from recording.conftest import number, topic
+from support.recorded import number, topic
 from lathe_chatter.recording import RunWriter
 writer = RunWriter(Path(sys.argv[1]))
 writer.add_topic(topic('/numbers'))

@@ -8,15 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.conftest import topic
+from support.recorded import topic
 
-from lathe_chatter.changes import BEGINNING, BEGINNING_AGAIN, change_sentence, knock_sentence
+from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe_parameters import lathe_from, parameters_of
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, Cut, Machine, Mode
+from lathe_chatter.lathe.cut_events import (
+    BEGINNING,
+    BEGINNING_AGAIN,
+    change_sentence,
+    knock_sentence,
+)
+from lathe_chatter.lathe.parameters import lathe_from, parameters_of
+from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
-from lathe_chatter.recording.identity import IDENTITY, PARAMETERS, identity, parameter_values
+from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.ros_messages import parameters_bytes
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 TICK = 20
 Alter = Callable[[int, Array], Array]

@@ -7,13 +7,7 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.stability import (
-    contact_at,
-    floquet,
-    growth_map,
-    rightmost_root,
-    safe_limit,
-)
+from lathe_chatter.stability import contact_at, floquet, growth_map, rightmost_root, safe_limit
 
 MACHINE = Machine()
 SPEEDS, DEPTHS = np.linspace(2000.0, 6000.0, 9), np.linspace(0.2e-3, 1.2e-3, 6)

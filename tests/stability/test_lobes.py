@@ -4,15 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from machines import random_machine
+from support.machines import random_machine
 
 from lathe_chatter.model import Machine, Mode
-from lathe_chatter.stability import (
-    critical_depth,
-    lobe_boundary,
-    rightmost_root,
-    rightmost_roots,
-)
+from lathe_chatter.stability import critical_depth, lobe_boundary, rightmost_root, rightmost_roots
 
 PUBLISHED = [
     (3000.0, False, 0.664984, 6),

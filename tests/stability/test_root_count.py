@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from machines import random_machine
+from support.machines import random_machine
 
 from lathe_chatter.model import Machine
 from lathe_chatter.stability import count_roots_right_of, critical_depth, leading_roots

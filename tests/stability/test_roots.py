@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from machines import random_machine
-from reference import collocation
+from support.machines import random_machine
+from support.reference import collocation
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine, Mode

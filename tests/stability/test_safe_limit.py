@@ -7,7 +7,8 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, BearingContact, Cut, Machine
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import (
     contact_at,
     critical_depth,

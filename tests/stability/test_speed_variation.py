@@ -3,9 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import SAMPLE_COLUMNS, Array, BearingContact, Cut, Machine
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import (
     dominant_eigenvalue,
     floquet,

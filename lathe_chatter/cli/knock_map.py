@@ -1,0 +1,177 @@
+"""`lathe-chatter knock-map`: the knock that a cut survives, over speed, depth and clearance."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from lathe_chatter.cli.console import print_json
+from lathe_chatter.cli.parameter_options import add_parameter_options, start_of
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.knocks import KnockGrid, KnockMap, Margin, run_knock_map
+from lathe_chatter.model import Cut
+from lathe_chatter.model.quantities import quantity_of
+from lathe_chatter.precompile import precompile
+from lathe_chatter.stability import contact_at
+
+NAME = 'knock-map'
+HELP = 'simulate which knock turns a stable cut into lasting chatter, over speed and depth'
+EXAMPLE = 'lathe-chatter knock-map --speeds 2000:6000:33 --depths 0.0004:0.001:25'
+
+INTERRUPTED = 130
+_AXES = (
+    ('speeds', 'spindle_speed_rpm', 'rev/min'),
+    ('depths', 'depth_of_cut', 'm'),
+    ('clearances', 'bearing_clearance', 'm'),
+)
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    for option, _, unit in _AXES:
+        parser.add_argument(
+            f'--{option}', metavar='A:B:N',
+            help=f'N values from A to B, or one, {unit} (default: that of the cut)',
+        )  # fmt: skip
+    parser.add_argument(
+        '--output', type=Path, default=Path('knocks.jsonl'), metavar='FILE',
+        help='file to keep the points in, with a PNG and an SVG beside it; one that was '
+        'interrupted is continued (default: %(default)s)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--reach', type=float, default=30.0, metavar='X',
+        help='largest knock over the largest that is sure to die out (default: %(default)g)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--step', type=float, default=1.12, metavar='X',
+        help='ratio of one knock tried to the next (default: %(default)g)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--tolerance', type=float, default=0.01, metavar='X',
+        help='relative width to which the smallest is bracketed (default: %(default)g)',
+    )  # fmt: skip
+    parser.add_argument('--json', action='store_true', help='print the points as JSON')
+    add_parameter_options(
+        parser,
+        without=(
+            'spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'force_noise',
+            'sensor_noise', 'runout', 'speed_variation_amplitude', 'speed_variation_frequency',
+            'seed', 'sample_rate', 'spindle_acceleration', 'tool_leaves_cut',
+        ),
+    )  # fmt: skip
+
+
+def run(options: Namespace) -> int:
+    """Compute, or continue, and draw."""
+    from lathe_chatter.report.knock_picture import draw_knock_map
+
+    speeds, depths, clearances = (
+        _axis(option, field, getattr(options, option)) for option, field, _ in _AXES
+    )
+    grid = KnockGrid(
+        start_of(options), speeds, depths, clearances,
+        options.reach, options.step, options.tolerance,
+    )  # fmt: skip
+    console = Console(stderr=options.json, highlight=False)
+    with console.status('Compiling the integrator (once on a machine) ...'):
+        precompile()
+    columns = (
+        TextColumn('{task.description}'),
+        BarColumn(bar_width=None),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    try:
+        with Progress(*columns, console=console, transient=True) as progress:
+            bar = progress.add_task('points', total=None)
+            knocks = run_knock_map(
+                grid,
+                options.output,
+                lambda done, total: progress.update(bar, completed=done, total=total),
+            )
+    except KeyboardInterrupt:
+        console.print(f'Interrupted: the same call goes on from {options.output}.')
+        return INTERRUPTED
+    picture = options.output.with_suffix('.png')
+    draw_knock_map(knocks, picture)
+    _show(knocks, console)
+    console.print(f'points   {options.output}\npicture  {picture}', soft_wrap=True)
+    if options.json:
+        print_json(_figures(knocks))
+    return 0
+
+
+def _axis(option: str, field: str, text: str | None) -> tuple[float, ...]:
+    """`A:B:N` or a single value as values of a field of the cut.
+
+    Raises:
+        ParameterError: If it is neither, or a value is not allowed.
+    """
+    limits = quantity_of(Cut.__dataclass_fields__[field])
+    if text is None or limits is None:
+        return (float(getattr(Cut(), field)),)
+    parts = text.split(':')
+    try:
+        values = [float(part) for part in parts[:2]]
+        count = int(parts[2]) if len(parts) == 3 else 1
+    except ValueError:
+        values, count = [], 0
+    if len(parts) not in {1, 3} or count < (2 if len(parts) == 3 else 1):
+        raise ParameterError(f'--{option}', text, '', 'one value, or A:B:N with N of 2 or more')
+    checked = [limits.check(f'--{option}', value) for value in values]
+    if len(checked) == 1:
+        return (checked[0],)
+    if not checked[0] < checked[1]:
+        raise ParameterError(f'--{option}', text, '', 'A:B:N with A below B')
+    return tuple(np.linspace(checked[0], checked[1], count).tolist())
+
+
+def _show(knocks: KnockMap, console: Console) -> None:
+    """How the points are divided, and the weakest of the conditionally stable ones."""
+    limits = list(knocks.limits.items())
+    counts = {margin: sum(limit.margin is margin for _, limit in limits) for margin in Margin}
+    console.print(
+        f'{len(limits)} cuts: {counts[Margin.UNSTABLE]} chatter unknocked, '
+        f'{counts[Margin.FINITE]} can be knocked into lasting chatter, '
+        f'{counts[Margin.NONE_FOUND]} survived every knock tried.'
+    )
+    finite = [(point, limit) for point, limit in limits if limit.margin is Margin.FINITE]
+    if finite:
+        point, limit = min(finite, key=lambda entry: abs(entry[1].impulse))
+        grid = knocks.grid
+        stable = contact_at(grid.start.machine, grid.cut_at(point))
+        console.print(
+            f'Weakest: {point.spindle_speed_rpm:g} rev/min, {point.depth_of_cut * 1e3:.4g} mm '
+            f'(limit {stable.limit * 1e3:.4g} mm), clearance '
+            f'{point.bearing_clearance * 1e6:.4g} µm: a knock of '
+            f'{abs(limit.impulse) * 1e3:.4g} mN s lasts, of {limit.survived * 1e3:.4g} mN s '
+            f'dies out; chatter of {limit.amplitude * 1e6:.3g} µm peak to peak at the tool.'
+        )
+
+
+def _figures(knocks: KnockMap) -> list[dict[str, Any]]:
+    """Every point, SI units; what is unknown is null."""
+    return [
+        point._asdict()
+        | {
+            'margin': limit.margin.value,
+            'impulse': limit.impulse if math.isfinite(limit.impulse) else None,
+            'survived': limit.survived,
+            'searched': limit.searched if math.isfinite(limit.searched) else None,
+        }
+        for point, limit in sorted(knocks.limits.items())
+    ]

@@ -1,0 +1,161 @@
+"""`lathe-chatter lobes`: the stability chart of a machine as a picture and as numbers."""
+
+from __future__ import annotations
+
+import csv
+import math
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.cli.console import print_json
+from lathe_chatter.cli.parameter_options import add_parameter_options, start_of
+from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.lathe.config import Start
+from lathe_chatter.model import BearingContact
+from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.report.stability_chart import chart_speeds, draw_lobes
+from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map, safe_limit
+
+NAME = 'lobes'
+HELP = 'draw the stability chart: both limits, the seating line and the safe region'
+EXAMPLE = 'lathe-chatter lobes --bearing-clearance 1e-5 --map --csv lobes.csv'
+
+_SPEED = Quantity('spindle speed', 'rev/min', low=60.0, high=30000.0)
+_DEPTH = Quantity('top of the chart', 'm', high=0.01, exclusive=True)
+_HEADROOM = 2.6
+_MAP = (111, 38)
+_VARIED_MAP = (56, 20)
+"""Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
+
+
+class OutputError(LatheChatterError):
+    """A file that cannot be written."""
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        '--from', dest='low', type=float, default=1000.0, metavar='RPM',
+        help='lowest speed, rev/min (default: %(default)g)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--to', dest='high', type=float, default=12000.0, metavar='RPM',
+        help='highest speed, rev/min (default: %(default)g)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--depth-limit', type=float, metavar='M', help='top of the chart, m (default: fits)'
+    )
+    parser.add_argument('--map', action='store_true', help='colour the chart with the growth rate')
+    parser.add_argument(
+        '--output', type=Path, default=Path('lobes.png'), metavar='FILE',
+        help='picture to write, with an SVG beside it (default: %(default)s)',
+    )  # fmt: skip
+    parser.add_argument('--csv', type=Path, metavar='FILE', help='write the limits as CSV too')
+    parser.add_argument('--json', action='store_true', help='print the limits as JSON')
+    add_parameter_options(
+        parser, without=('force_noise', 'sensor_noise', 'runout', 'seed', 'sample_rate',
+                         'spindle_acceleration'),
+    )  # fmt: skip
+
+
+def run(options: Namespace) -> int:
+    """Draw and print the chart."""
+    start = start_of(options)
+    low, high = _SPEED.check('--from', options.low), _SPEED.check('--to', options.high)
+    if not low < high:
+        raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
+    speeds = chart_speeds(low, high)
+    limits = safe_limit(
+        start.machine, start.cut, speeds, tool_leaves_cut=start.setup.tool_leaves_cut
+    )
+    top = _top(limits) if options.depth_limit is None else options.depth_limit
+    top = _DEPTH.check('--depth-limit', top)
+    console = Console(stderr=options.json, highlight=False)
+    varied = start.cut.speed_variation_amplitude > 0.0
+    growth = None
+    if options.map or varied:
+        with console.status('Computing the growth rates ...'):
+            growth = _map(start, low, high, top, varied=varied)
+    try:
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        draw_lobes(start, limits, growth, top, options.output)
+        if options.csv is not None:
+            _write_csv(options.csv, start, limits)
+    except OSError as error:
+        raise OutputError(f'{error.filename} cannot be written: {error.strerror}.') from None
+    _show(start, limits, console)
+    console.print(f'picture  {options.output}', soft_wrap=True)
+    if options.json:
+        print_json(_figures(start, limits, growth))
+    return 0
+
+
+def _top(limits: SafeLimit) -> float:
+    """Where a chart may end: some lowest limits up."""
+    lowest = float(np.min(limits.open_limit))
+    return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
+
+
+def _map(start: Start, low: float, high: float, top: float, *, varied: bool) -> GrowthMap:
+    columns, rows = _VARIED_MAP if varied else _MAP
+    return growth_map(
+        start.machine,
+        start.cut,
+        np.linspace(low, high, columns),
+        np.linspace(top / rows, top, rows),
+        tool_leaves_cut=start.setup.tool_leaves_cut,
+    )
+
+
+def _columns(start: Start, limits: SafeLimit) -> dict[str, Array]:
+    """The chart as columns; without what the machine has not."""
+    columns = {
+        'spindle_speed_rpm': limits.spindle_speed_rpm,
+        'safe_depth': limits.depth_of_cut,
+        'open_limit': limits.open_limit,
+    }
+    if start.cut.bearing_contact is not BearingContact.NONE:
+        columns |= {'seated_limit': limits.seated_limit, 'seating_line': limits.seating_line}
+    return columns
+
+
+def _write_csv(path: Path, start: Start, limits: SafeLimit) -> None:
+    """Limits over speed, m and rev/min; an infinite limit is `inf`."""
+    columns = _columns(start, limits)
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+
+
+def _figures(start: Start, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
+    """As JSON holds it: an infinite limit is null."""
+    found: dict[str, Any] = {
+        name: [value if math.isfinite(value) else None for value in values.tolist()]
+        for name, values in _columns(start, limits).items()
+    }
+    if growth is not None:
+        found['map'] = {
+            'spindle_speed_rpm': growth.spindle_speed_rpm.tolist(),
+            'depth_of_cut': growth.depth_of_cut.tolist(),
+            'growth_rate': growth.growth_rate.tolist(),
+            'seated': growth.seated.tolist(),
+        }
+    return {'parameters': start.parameters(), **found}
+
+
+def _show(start: Start, limits: SafeLimit, console: Console) -> None:
+    """The lowest limits, and what holds at the speed of the cut."""
+    names = [('open', limits.open_limit)]
+    if start.cut.bearing_contact is not BearingContact.NONE:
+        names.append(('on its bearing', limits.seated_limit))
+    names.append(('safe', limits.depth_of_cut))
+    for name, values in names:
+        place = int(np.argmin(values))
+        speed = limits.spindle_speed_rpm[place]
+        console.print(f'lowest limit, {name}: {values[place] * 1e3:.4f} mm at {speed:.0f} rev/min')

@@ -1,0 +1,199 @@
+"""`lathe-chatter reproduce`: the paper's 14 runs, judged and drawn."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from lathe_chatter.cli.console import print_json
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
+from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
+from lathe_chatter.paper.overview import draw_conditions, draw_findings, draw_growth
+from lathe_chatter.paper.page import OVERVIEWS, write_page
+from lathe_chatter.precompile import precompile
+
+NAME = 'reproduce'
+HELP = "reproduce the paper's 14 runs: verdicts, exact roots, measured growth rates, figures"
+EXAMPLE = 'lathe-chatter reproduce --output reproduction'
+
+FIGURES = 'reproduction.json'
+_FINDING_STEPS = 3
+
+
+class OutputError(LatheChatterError):
+    """A folder that cannot be written."""
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        '--output', type=Path, default=Path('reproduction'), metavar='DIR',
+        help='folder for the page and its pictures (default: %(default)s)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--no-pictures',
+        action='store_true',
+        help='leave out the pictures: tables and figures only',
+    )
+    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+
+
+def run(options: Namespace) -> int:
+    """Reproduce; 0 if every verdict of the paper agrees, else 1."""
+    folder: Path = options.output
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f'The folder {folder} cannot be made: {error.strerror}.') from None
+    console = Console(stderr=options.json, highlight=False)
+    with console.status('Compiling the integrator (once on a machine) ...'):
+        precompile()
+    pictures = [] if options.no_pictures else [*OVERVIEWS, *paper_pictures()]
+    results, findings = _work(folder, pictures, console)
+    page = write_page(folder, results, findings, pictures)
+    figures = figures_of(results, findings)
+    text = json.dumps(figures, indent=2)
+    (folder / FIGURES).write_text(text + '\n', encoding='utf-8')
+    _show(results, findings, console)
+    console.print(f'page     {page}\nfigures  {folder / FIGURES}', soft_wrap=True)
+    if options.json:
+        print_json(figures)
+    return 0 if all(result.agrees for result in results) else 1
+
+
+def _work(
+    folder: Path, pictures: Sequence[Picture], console: Console
+) -> tuple[list[Reproduced], Findings]:
+    """Compute here while other processes draw."""
+    columns = (
+        TextColumn('{task.description}'),
+        BarColumn(bar_width=None),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    # Not forked: threads of a library that has begun to compute do not survive that.
+    pool = ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context('spawn'))
+    with pool, Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task(
+            'runs and pictures', total=len(PAPER_RUNS) + _FINDING_STEPS + len(pictures)
+        )
+        drawn: list[Future[None]] = []
+
+        def step(_: Any = None) -> None:
+            progress.advance(bar)
+
+        def draw(work: Callable[..., None], *arguments: Any) -> None:
+            future = pool.submit(work, *arguments)
+            future.add_done_callback(step)
+            drawn.append(future)
+
+        for picture in pictures:
+            if picture not in OVERVIEWS:
+                draw(draw_paper_picture, picture.name, folder)
+        results = []
+        for paper_run in PAPER_RUNS:
+            results.append(reproduce_run(paper_run))
+            step()
+        findings = find(tell=step)
+        if pictures:
+            draw(draw_growth, results, folder / 'growth')
+            draw(draw_conditions, results, folder / 'conditions')
+            draw(draw_findings, findings, folder / 'findings')
+        for future in as_completed(drawn):
+            future.result()
+    return results, findings
+
+
+def figures_of(results: list[Reproduced], findings: Findings) -> dict[str, Any]:
+    """Everything that was found, as JSON holds it; SI units, growth rates in 1/s."""
+    runs = []
+    for result in results:
+        literal = result.literal
+        runs.append(
+            {
+                'name': result.run.name,
+                'spindle_speed_rpm': result.run.spindle_speed_rpm,
+                'depth_of_cut': result.run.depth_of_cut,
+                'bearing_clearance': result.run.bearing_clearance,
+                'places': list(result.run.places),
+                'words': result.run.words,
+                'paper_unstable': result.run.unstable,
+                'unstable': result.unstable,
+                'root': {'growth_rate': result.root.real, 'angular_frequency': result.root.imag},
+                'measured': {
+                    'growth_rate': result.measured.real,
+                    'angular_frequency': result.measured.imag,
+                },
+                'agrees': result.agrees,
+                'equation_9': literal
+                and {**asdict(literal), 'unstable': literal.unstable}
+                | {'agrees': result.literal_agrees},
+            }
+        )
+    stiffness = findings.stiffness
+    return {
+        'runs': runs,
+        'agreeing': sum(result.agrees for result in results),
+        'cutting_coefficient': asdict(findings.coefficient)
+        | {'readings': [asdict(reading) for reading in findings.readings]},
+        'screening_function': [
+            {
+                'contact': reading.contact.value,
+                'verdicts': reading.verdicts,
+                'against': list(reading.against),
+            }
+            for reading in findings.screening
+        ],
+        'clearance': asdict(findings.clearance),
+        'bearing_stiffness': {
+            'share_of_workpiece': stiffness.shares.tolist(),
+            'critical_depth': stiffness.limits.tolist(),
+            'worst_share': stiffness.worst,
+        },
+        'figure_windows': [asdict(window) for window in findings.windows],
+    }
+
+
+def _show(results: list[Reproduced], findings: Findings, console: Console) -> None:
+    """Print what was found."""
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column('run', no_wrap=True)
+    table.add_column('the paper')
+    for title in ('root', 'measured', 'agrees', 'eq. (9)'):
+        table.add_column(title, justify='right', no_wrap=True)
+    for result in results:
+        literal = result.literal
+        table.add_row(
+            result.run.title,
+            result.run.pace.value,
+            f'{result.root.real:+.4f}',
+            f'{result.measured.real:+.4f}',
+            'yes' if result.agrees else '[bold]no[/bold]',
+            '' if literal is None else 'agrees' if result.literal_agrees else 'stable',
+        )
+    console.print(table)
+    found = findings.coefficient
+    verdicts = {reading.contact.value: reading.verdicts for reading in findings.screening}
+    count = len(results)
+    agreeing = sum(result.agrees for result in results)
+    console.print(
+        f'{agreeing} of {count} verdicts agree. Growth rates in 1/s: of the rightmost root, and\n'
+        'measured from the time simulation; eq. (9): the same with the screening function as '
+        'printed.\n'
+        f'All verdicts hold together for {found.low:.5g} < C < {found.high:.5g} N/m2.\n'
+        f'Screening function never 1: {verdicts["none"]} of {count} verdicts hold; as printed: '
+        f'{verdicts["gap"]}; always 1: {verdicts["seated"]}.'
+    )

@@ -1,0 +1,156 @@
+"""`lathe-chatter simulate`: the same machine with no ROS, as fast as possible, into a run."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from lathe_chatter.cli.console import print_json, tell_verdict
+from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
+from lathe_chatter.cli.report import show_run
+from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.lathe.cut_events import Knock
+from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.precompile import precompile
+from lathe_chatter.report.history import read_history
+from lathe_chatter.scenario import (
+    CLEARED,
+    FLAGGED,
+    Scenario,
+    find_scenario,
+    load_scenario,
+    shipped_scenarios,
+)
+from lathe_chatter.scenario.simulation import Simulated, needs_monitor, simulate
+
+NAME = 'simulate'
+HELP = 'simulate a cut without ROS, as fast as possible, and record it'
+EXAMPLE = 'lathe-chatter simulate --depth-of-cut 0.001 --duration 20 --output runs/deep'
+
+_DURATION = Quantity('simulated time', 's', high=86400.0, exclusive=True)
+_USUAL_DURATION = 10.0
+
+
+class SimulationFailedError(LatheChatterError):
+    """A run that cannot be written."""
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        '--output', type=Path, required=True, metavar='DIR', help='folder of the run, to make'
+    )
+    parser.add_argument(
+        '--duration', type=float, metavar='S',
+        help=f"simulated time, s (default: the scenario's, else {_USUAL_DURATION:g})",
+    )  # fmt: skip
+    parser.add_argument(
+        '--scenario', metavar='FILE',
+        help=f'a YAML file, or one of {", ".join(shipped_scenarios())}; options below win',
+    )  # fmt: skip
+    parser.add_argument(
+        '--knock', action='append', default=[], metavar='T:J',
+        help='an impulse of J N s on the tool at T s; may be repeated',
+    )  # fmt: skip
+    parser.add_argument(
+        '--monitor', action='store_true',
+        help='have the monitor watch even if no scenario waits for it',
+    )  # fmt: skip
+    parser.add_argument('--report', action='store_true', help='report on the run when it is done')
+    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_parameter_options(parser)
+
+
+def run(options: Namespace) -> int:
+    """Simulate; 0 if the lathe got to the end and the monitor said what is expected, else 1."""
+    scenario = _scenario(options)
+    knocks = [_knock(text, scenario.duration) for text in options.knock]
+    console = Console(stderr=options.json, highlight=False)
+    with console.status('Compiling the integrator (once on a machine) ...'):
+        precompile()
+    begun = time.perf_counter()
+    done = _simulated(options, scenario, knocks, console)
+    spent = time.perf_counter() - begun
+    console.print(
+        f'{done.time:g} s simulated in {spent:.2f} s, {done.time / spent:.0f} times real time: '
+        f'{done.samples} samples.'
+    )
+    if done.guard:
+        console.print(done.guard)
+    figures = {
+        'run': str(done.folder),
+        'samples': done.samples,
+        'simulated_time': done.time,
+        'wall_time': spent,
+        'flagged': done.flagged,
+        'cleared': done.cleared,
+        'guard': done.guard,
+    }
+    if options.report:
+        figures |= show_run(read_history(done.folder), console)
+    else:
+        console.print(f'run      {escape(str(done.folder))}', soft_wrap=True)
+    if options.json:
+        print_json(figures)
+    said = {FLAGGED: done.flagged, CLEARED: done.cleared}
+    wrong = tell_verdict(scenario, said, console)
+    return 1 if done.guard else wrong
+
+
+def _scenario(options: Namespace) -> Scenario:
+    """What to play: a file's or an empty one, with the options over it."""
+    scenario = Scenario('cut', 'A cut', _USUAL_DURATION)
+    if options.scenario is not None:
+        scenario = load_scenario(find_scenario(options.scenario))
+    if options.duration is not None:
+        duration = _DURATION.check('--duration', options.duration)
+        scenario = replace(scenario, duration=duration)
+    return replace(scenario, parameters={**scenario.parameters, **given_parameters(options)})
+
+
+def _knock(text: str, duration: float) -> Knock:
+    """`T:J` as a knock in a run of so many seconds.
+
+    Raises:
+        ParameterError: If it is none.
+    """
+    time_text, _, impulse_text = text.partition(':')
+    try:
+        at, impulse = float(time_text), float(impulse_text)
+    except ValueError:
+        raise ParameterError('--knock', text, '', 'T:J, as 1.5:0.002') from None
+    Quantity('time', 's', high=duration).check('--knock', at)
+    Quantity('impulse', 'N s', low=-1e3, high=1e3).check('--knock', impulse)
+    return Knock(at, impulse)
+
+
+def _simulated(
+    options: Namespace, scenario: Scenario, knocks: list[Knock], console: Console
+) -> Simulated:
+    """Simulate with a bar of simulated time."""
+    columns = (
+        TextColumn('{task.completed:6.2f} of {task.total:g} s'),
+        BarColumn(bar_width=None),
+        TimeElapsedColumn(),
+    )
+    try:
+        with Progress(*columns, console=console, transient=True) as progress:
+            bar = progress.add_task('', total=scenario.duration)
+            return simulate(
+                scenario,
+                options.output,
+                knocks=knocks,
+                monitor=options.monitor or needs_monitor(scenario),
+                progress=lambda now: progress.update(bar, completed=now),
+                tell=lambda now, what: console.print(f'{now:7.2f} s  {escape(what)}'),
+            )
+    except OSError as error:
+        raise SimulationFailedError(
+            f'The run {options.output} cannot be written: {error.strerror}.'
+        ) from None

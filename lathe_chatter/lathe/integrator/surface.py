@@ -1,0 +1,134 @@
+"""What the last revolution left on the workpiece, kept against spindle angle.
+
+The surface is a chain of quintics over spindle angle. Each node carries the surface S with its
+first two derivatives by angle on either side, because a knock, a retune or an event leaves a
+corner; S is measured from where the feed stood when the current turn began. Positions are in
+revolutions of the current turn: the surface that the tool meets at angle phi stands at phi - 1.
+
+A node also says of which derivative it carries a jump (`ORDER`). One turn later a jump in
+derivative q of the surface is a jump in derivative q + 2 of the motion, since it enters through
+a force: after a few turns it is smoother than a quintic can tell, and is dropped.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.compiled import compiled
+
+# One node is one cache line of 8 numbers, see `empty_nodes`.
+(
+    ANGLE,  # rev, of the current turn; the turn before is negative
+    HEIGHT,  # S, m
+    SLOPE_BEFORE,  # dS/dphi on the side of smaller angle, m/rev
+    CURVATURE_BEFORE,  # d2S/dphi2 there, m/rev2
+    SLOPE_AFTER,
+    CURVATURE_AFTER,
+    ORDER,  # lowest derivative of S that jumps here, or SMOOTH
+    PITCH,  # rev per whole step when the surface was cut: how finely it is described
+) = range(8)
+NODE_SIZE = 8
+_CACHE_LINE = 64
+
+SMOOTH = 99.0
+LAST_ORDER = 4.0
+"""Jumps in higher derivatives than this are below the quintic's own error."""
+MERGE = 1e-9
+"""Two instants closer than this part of a step are one."""
+
+
+def empty_nodes(*shape: int) -> Array:
+    """Room for nodes (*shape, NODE_SIZE), each in one line of the processor's cache."""
+    return aligned(*shape, NODE_SIZE)
+
+
+def aligned(*shape: int) -> Array:
+    """Zeros that begin where a line of the processor's cache does."""
+    size = math.prod(shape)
+    room = np.zeros(size + _CACHE_LINE // 8)
+    first = -room.ctypes.data % _CACHE_LINE // room.itemsize
+    return room[first : first + size].reshape(shape)
+
+
+def with_room(nodes: Array, capacity: int) -> Array:
+    """The same nodes (..., n, NODE_SIZE) with room for `capacity` of them."""
+    result = empty_nodes(*nodes.shape[:-2], capacity)
+    result[..., : nodes.shape[-2], :] = nodes
+    return result
+
+
+def fresh_surface(slope: float, capacity: int) -> Array:
+    """A smooth surface before the first turn: S = slope * phi for phi <= 0 (capacity, 8)."""
+    nodes = empty_nodes(capacity)
+    nodes[:2, ANGLE] = -1.0, 0.0
+    nodes[:2, HEIGHT] = -slope, 0.0
+    nodes[:2, SLOPE_BEFORE] = nodes[:2, SLOPE_AFTER] = slope
+    nodes[:2, ORDER] = SMOOTH
+    nodes[:2, PITCH] = math.inf
+    return nodes
+
+
+@compiled(inline=True, borrows=True)
+def quintic_at(
+    angle0: float, height0: float, slope0: float, curvature0: float,
+    angle1: float, height1: float, slope1: float, curvature1: float, angle: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """S, dS/dphi and d2S/dphi2 at `angle` on the quintic with these values at two angles."""
+    width = angle1 - angle0
+    per_width = 1.0 / width
+    place = (angle - angle0) * per_width
+    d0 = slope0 * width
+    e0 = curvature0 * width * width
+    rise = height1 - height0 - d0 - 0.5 * e0
+    steep = slope1 * width - d0 - e0
+    bend = curvature1 * width * width - e0
+    c3 = 10.0 * rise - 4.0 * steep + 0.5 * bend
+    c4 = -15.0 * rise + 7.0 * steep - bend
+    c5 = 6.0 * rise - 3.0 * steep + 0.5 * bend
+    height = height0 + place * (d0 + place * (0.5 * e0 + place * (c3 + place * (c4 + place * c5))))
+    slope = d0 + place * (e0 + place * (3.0 * c3 + place * (4.0 * c4 + place * 5.0 * c5)))
+    curvature = e0 + place * (6.0 * c3 + place * (12.0 * c4 + place * 20.0 * c5))
+    return height, slope * per_width, curvature * (per_width * per_width)
+
+
+@compiled(inline=True, borrows=True)
+def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
+    """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
+    right = left + 1
+    return quintic_at(
+        nodes[left, ANGLE], nodes[left, HEIGHT],
+        nodes[left, SLOPE_AFTER], nodes[left, CURVATURE_AFTER],
+        nodes[right, ANGLE], nodes[right, HEIGHT],
+        nodes[right, SLOPE_BEFORE], nodes[right, CURVATURE_BEFORE], angle,
+    )  # fmt: skip
+
+
+@compiled(inline=True, borrows=True)
+def write_node(
+    nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float,
+    pitch: float,
+) -> None:  # fmt: skip
+    """Write a node that is smooth until it turns out to be a corner."""
+    nodes[node, ANGLE] = angle
+    nodes[node, HEIGHT] = height
+    nodes[node, SLOPE_BEFORE] = nodes[node, SLOPE_AFTER] = slope
+    nodes[node, CURVATURE_BEFORE] = nodes[node, CURVATURE_AFTER] = curvature
+    nodes[node, ORDER] = SMOOTH
+    nodes[node, PITCH] = pitch
+
+
+@compiled(borrows=True)
+def next_turn(nodes: Array, first: int, last: int, advance: float) -> None:
+    """Forget what lies before node `first`, and count angle and feed from the new turn on.
+
+    Rebasing once a turn keeps angles below 2 rev and heights near one feed, so that an hour
+    of cutting is as exact as its first second, and the memory is that of one turn.
+    """
+    for node in range(first, last + 1):
+        for entry in range(NODE_SIZE):
+            nodes[node - first, entry] = nodes[node, entry]
+        nodes[node - first, ANGLE] -= 1.0
+        nodes[node - first, HEIGHT] -= advance

@@ -1,0 +1,262 @@
+"""`VirtualLathe`: a machine that cuts, can be retuned while it does, saved and continued."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.lathe.integrator import propagation, stepper, surface
+from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator.coefficients import constants_of
+from lathe_chatter.lathe.setup import LatheSetup
+from lathe_chatter.lathe.state import LatheState, StateError, differences
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.quantities import Quantity, count_of
+from lathe_chatter.samples import SAMPLE_COLUMNS
+
+_IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
+
+
+class EventKind(IntEnum):
+    """What can happen inside a step."""
+
+    BEARING_ENGAGES = layout.BEARING_ENGAGES
+    BEARING_RELEASES = layout.BEARING_RELEASES
+    TOOL_LEAVES_CUT = layout.TOOL_LEAVES
+    TOOL_ENTERS_CUT = layout.TOOL_ENTERS
+
+
+class Event(NamedTuple):
+    """A located event: simulated time, s, and what happened."""
+
+    time: float
+    kind: EventKind
+
+
+class VirtualLathe:
+    """A turning process with bearing clearance, integrated sample by sample.
+
+    The machine is that of the paper's equations (8)-(9). With `tool_leaves_cut` the cutting
+    force is F = C w max(h, 0), h = feed + r - (surface left before), and where the tool is out
+    of the cut the surface of earlier revolutions stays; without it the force is the paper's
+    linear one about the mean, equation (2). Speed changes need no restart: the delay is the
+    time since the spindle was one turn back.
+
+    Args:
+        machine: Tool, workpiece, bearing and material; by default the paper's.
+        cut: What is cut at the start; see `retune`.
+        initial_state: Tool displacement and velocity, workpiece displacement and velocity at
+            t = 0 (4,), m and m/s; by default the paper's. The surface before t = 0 is smooth.
+        sample_rate: Samples per simulated second, Hz.
+        tool_leaves_cut: The force law, as above.
+        spindle_acceleration: rev/min per s at which the speed follows a change; 0 for a step.
+        seed: Of force noise and sensor noise.
+        displacement_limit: The run ends when a displacement passes it, m.
+
+    Raises:
+        ParameterError: If a value is not allowed.
+    """
+
+    def __init__(  # noqa: PLR0913 -- what cannot change later is named here
+        self,
+        machine: Machine | None = None,
+        cut: Cut | None = None,
+        *,
+        initial_state: Sequence[float] | Array | None = None,
+        sample_rate: float = 1e4,
+        tool_leaves_cut: bool = True,
+        spindle_acceleration: float = 0.0,
+        seed: int = 0,
+        displacement_limit: float = 1.0,
+    ) -> None:
+        """See the class."""
+        setup = LatheSetup(
+            Machine() if machine is None else machine,
+            sample_rate,
+            tool_leaves_cut,
+            spindle_acceleration,
+            seed,
+            displacement_limit,
+        )
+        self._event_space: Array = np.empty((64, 3))
+        self._found: list[Array] = []
+        start = Cut() if cut is None else _checked(cut)
+        self._begin(LatheState.fresh(setup, start, initial_state))
+
+    @classmethod
+    def continued(cls, state: LatheState) -> VirtualLathe:
+        """A lathe that goes on from a snapshot or a loaded state, bit for bit."""
+        lathe = cls(state.setup.machine, state.cut)
+        lathe._begin(state.copy())
+        return lathe
+
+    # -- what it is doing ----------------------------------------------------------------
+
+    @property
+    def setup(self) -> LatheSetup:
+        """What it was given at the start."""
+        return self._state.setup
+
+    @property
+    def machine(self) -> Machine:
+        """Tool, workpiece, bearing and material."""
+        return self.setup.machine
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per simulated second, Hz."""
+        return self.setup.sample_rate
+
+    @property
+    def cut(self) -> Cut:
+        """The parameters of the cut in force."""
+        return self._state.cut
+
+    @property
+    def samples_taken(self) -> int:
+        """Samples since the start."""
+        return int(self._state.counts[layout.SAMPLES])
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.samples_taken / self.sample_rate
+
+    @property
+    def spindle_angle(self) -> float:
+        """Revolutions since the start."""
+        return float(self._state.counts[layout.TURNS] + self._state.numbers[layout.ANGLE])
+
+    @property
+    def bearing_engaged(self) -> bool:
+        """Whether the workpiece touches its bearing across the clearance."""
+        return bool(self._state.counts[layout.REGIME] & propagation.ENGAGED)
+
+    @property
+    def tool_in_cut(self) -> bool:
+        """Whether the tool removes material."""
+        return bool(self._state.counts[layout.REGIME] & propagation.IN_CUT)
+
+    @property
+    def guard(self) -> str:
+        """Why the run has ended, as a sentence; empty while it goes on."""
+        return self._state.guard
+
+    @property
+    def events(self) -> list[Event]:
+        """The events located in the last call of `advance`, in order of time."""
+        return [
+            Event(float(before / self.sample_rate + since), EventKind(int(kind)))
+            for found in self._found
+            for before, since, kind in found
+        ]
+
+    # -- what it can be told ---------------------------------------------------------------
+
+    def advance(self, samples: int) -> Array:
+        """Cut on for a number of samples.
+
+        The events located on the way are left in `events`.
+
+        Args:
+            samples: How many, 0 or more.
+
+        Returns:
+            The samples (n, 8), columns as in `model.SAMPLE_COLUMNS`. Fewer than asked for,
+            and `guard` says why, once a displacement has passed its limit.
+
+        Raises:
+            ParameterError: If `samples` is negative.
+        """
+        count_of('samples', samples)
+        out = np.empty((0 if self.guard else samples, len(SAMPLE_COLUMNS)))
+        self._found = []
+        rows, status = 0, layout.SURFACE_FULL
+        while status in {layout.SURFACE_FULL, layout.EVENTS_FULL}:
+            done, found, status = self._call(out[rows:])
+            rows += done
+            if found:
+                self._found.append(self._event_space[:found].copy())
+            if status == layout.SURFACE_FULL:
+                nodes = self._state.nodes
+                self._state.nodes = surface.with_room(nodes, 2 * len(nodes))
+            elif status == layout.EVENTS_FULL:
+                self._event_space = np.empty((2 * len(self._event_space), 3))
+        if status == layout.GUARD:
+            self._state.end()
+        return out[:rows]
+
+    def retune(self, cut: Cut) -> None:
+        """Change the cut at the instant of the last sample; nothing is restarted.
+
+        Raises:
+            ParameterError: If the machine with this cut is too fast for the sample rate; then
+                nothing has changed.
+        """
+        if _checked(cut) != self.cut:
+            self._state.retune(cut)
+            self._prepare()
+
+    def knock(self, impulse: float) -> None:
+        """Hit the tool at the instant of the last sample: its velocity jumps by impulse / m_t.
+
+        Args:
+            impulse: N s, positive towards greater chip thickness.
+
+        Raises:
+            ParameterError: If it is not finite or beyond 1000 N s.
+        """
+        self._state.knock(_IMPULSE.check('impulse', impulse))
+
+    def snapshot(self) -> LatheState:
+        """A copy of everything that the lathe remembers; `LatheState.save` puts it in a file."""
+        return self._state.copy()
+
+    def restore(self, state: LatheState) -> None:
+        """Continue from a snapshot of a lathe of the same setup, bit for bit.
+
+        Raises:
+            StateError: If the setup was another; `continued` takes any.
+        """
+        others = differences(state.setup, self.setup)
+        if others:
+            raise StateError(
+                f'The saved lathe differs from this one in its {" and ".join(others)}: continue '
+                'it as a lathe of its own.'
+            )
+        self._begin(state.copy())
+
+    # -- how ------------------------------------------------------------------------------
+
+    def _begin(self, state: LatheState) -> None:
+        """Take over a state."""
+        self._state = state
+        self._found = []
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Turn machine and cut into the constants of the inner loop."""
+        steps = int(self._state.counts[layout.STEPS])
+        self._constants = constants_of(self.setup, self.cut, steps)
+
+    def _call(self, out: Array) -> tuple[int, int, int]:
+        """Run the inner loop on `out`: samples, events, and how it ended."""
+        state, constants = self._state, self._constants
+        done, found, status = stepper.advance(
+            state.numbers, state.counts, state.nodes,
+            constants.settings, constants.mechanics, constants.matrices,
+            self.setup.seed, out, self._event_space,
+        )  # fmt: skip
+        return int(done), int(found), int(status)
+
+
+def _checked(cut: Cut) -> Cut:
+    """The cut, if it is one."""
+    if not isinstance(cut, Cut):
+        raise ParameterError('cut', cut, '', 'a Cut')
+    return cut

@@ -1,0 +1,8 @@
+"""What is cut: the machine, the cut, and the limits of every quantity of theirs."""
+
+from __future__ import annotations
+
+from lathe_chatter.model.cut import BearingContact, Cut, paper_initial_state
+from lathe_chatter.model.machine import Machine, Mode
+
+__all__ = ['BearingContact', 'Cut', 'Machine', 'Mode', 'paper_initial_state']

@@ -1,0 +1,92 @@
+"""The cut: what an operator or a disturbance may change while the machine cuts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.model.quantities import check_choice, check_fields, quantity
+
+
+class BearingContact(str, Enum):
+    """How the bearing clearance enters the model (see the README for what the paper did)."""
+
+    NONE = 'none'
+    """No bearing clearance in the model, equations (1)-(7)."""
+    GAP = 'gap'
+    """Equation (9) as printed: the bearing engages while x_wp >= gamma."""
+    SEATED = 'seated'
+    """The screening function is 1 throughout: the workpiece-spindle rests on its bearing."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What an operator or a disturbance may change while the machine cuts.
+
+    Raises:
+        ParameterError: If a value is not finite or outside its limits.
+    """
+
+    spindle_speed_rpm: float = quantity(
+        'spindle speed', 'rev/min', default=3000.0, low=60.0, high=30000.0
+    )
+    depth_of_cut: float = quantity('depth of cut w', 'm', default=0.0005, high=0.01)
+    bearing_clearance: float = quantity('bearing clearance gamma', 'm', default=5e-6, high=0.001)
+    bearing_contact: BearingContact = BearingContact.GAP
+    feed_speed: float = quantity('feed speed', 'm/s', default=0.0025, high=0.1)
+    force_noise: float = quantity(
+        'random force on the tool: its mean over T s has the variance force_noise^2/T',
+        'N/sqrt(Hz)',
+        default=0.0,
+        high=1e3,
+    )
+    sensor_noise: float = quantity(
+        'noise of the measured displacements, rms per sample', 'm', default=0.0, high=1e-3
+    )
+    runout: float = quantity(
+        'once-per-turn amplitude at the workpiece', 'm', default=0.0, high=1e-3
+    )
+    speed_variation_amplitude: float = quantity(
+        'sinusoidal speed variation, fraction of the spindle speed', default=0.0, high=0.5
+    )
+    speed_variation_frequency: float = quantity(
+        'frequency of the speed variation', 'Hz', default=1.0, high=1e3, exclusive=True
+    )
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        check_fields(self)
+        contact = check_choice('bearing_contact', self.bearing_contact, BearingContact)
+        object.__setattr__(self, 'bearing_contact', contact)
+
+    @property
+    def delay(self) -> float:
+        """The regenerative delay tau, one spindle turn at the mean speed, s."""
+        return 60.0 / self.spindle_speed_rpm
+
+    @property
+    def feed(self) -> float:
+        """Feed per revolution at the mean speed, m."""
+        return self.feed_speed * self.delay
+
+    def with_changes(self, **changes: Any) -> Cut:
+        """The same cut with some fields changed.
+
+        Raises:
+            ParameterError: If a field does not exist or may not have its new value.
+        """
+        unknown = next((name for name in changes if name not in self.__dataclass_fields__), None)
+        if unknown is not None:
+            allowed = 'one of ' + ', '.join(self.__dataclass_fields__)
+            raise ParameterError('the name of a changed value', unknown, '', allowed)
+        return replace(self, **changes)
+
+
+def paper_initial_state(cut: Cut) -> Array:
+    """The paper's history at t = 0: both bodies displaced by f/1000 and moving with v (4,)."""
+    return np.array([cut.feed / 1000.0, cut.feed_speed, cut.feed / 1000.0, cut.feed_speed])

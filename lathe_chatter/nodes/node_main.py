@@ -1,0 +1,216 @@
+"""The life of a node's process: start errors as one sentence, and an orderly end on a signal."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+from types import FrameType
+from typing import TypeVar
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    SingleThreadedExecutor,
+)
+from rclpy.node import Node
+from rclpy.qos_overriding_options import InvalidQosOverridesError
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.exit_watchdog import end_within
+from lathe_chatter.nodes.parameter_node import ParameterNode
+
+try:
+    from rclpy.experimental.events_executor import EventsExecutor
+except ImportError:  # an rclpy older than the executor
+    EventsExecutor = None
+
+_Node = TypeVar('_Node', bound=ParameterNode)
+Spin = Callable[[Executor, _Node, Callable[[], bool]], None]
+"""Serves a node with an executor until a function says that it is told to end."""
+
+LOOK_UP = 0.1
+"""s after which a node that nothing happens to looks whether it was told to end."""
+
+_DELIVERY = 2.0
+"""s that the readers of a node have, at its end, to take what was published last."""
+
+_QUIET = 0.2
+"""s in which a finished node hears of others that ended just before it: Fast DDS may crash where a
+participant goes meanwhile."""
+_LETTING_GO = 5.0
+"""s that the middleware has to let go of a node that has finished."""
+
+_START_ERRORS = (
+    LatheChatterError,
+    InvalidQosOverridesError,
+    NameValidationException,
+    ParameterException,
+    RuntimeError,  # rcl's: arguments that are no ROS arguments
+    OSError,
+)
+
+
+class StartError(LatheChatterError):
+    """A command line that a node does not understand."""
+
+
+class _EndSignal:
+    """SIGINT and SIGTERM: an exception while the node is made, a flag once it runs.
+
+    rclpy's own handlers shut the context down under a callback that is publishing, and a node
+    could say nothing more at its end.
+    """
+
+    def __init__(self) -> None:
+        self.came = False
+        self._running = False
+        signal.signal(signal.SIGINT, self)
+        signal.signal(signal.SIGTERM, self)
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        self.came = True
+        if not self._running:
+            raise KeyboardInterrupt
+
+    def wait(self) -> None:
+        """From now on, only note the signal."""
+        self._running = True
+
+
+def run_node(
+    make: Callable[[], _Node],
+    args: list[str] | None = None,
+    *,
+    by_events: bool = True,
+    spin: Spin[_Node] | None = None,
+    usage: str = '',
+) -> None:
+    """Make a node and spin it until SIGINT, SIGTERM or a shutdown of its context.
+
+    The node is finished and destroyed in every case. Should the middleware not let go of it the
+    process ends all the same, for this is the last that it does.
+
+    Args:
+        make: Makes the node once rclpy is initialised.
+        args: Command-line arguments, those of the process by default.
+        by_events: Whether the executor may be the one driven by events; see `make_executor`.
+        spin: How the node is served until it is told to end; by default as `serve` does.
+        usage: What `--help` prints.
+
+    Raises:
+        SystemExit: With 0 after `--help`; with 2 and a sentence on stderr if the node cannot
+            start as it was asked to.
+    """
+    end = _EndSignal()
+    node: _Node | None = None
+    begun = False
+    try:
+        _take_no_words(sys.argv if args is None else ['', *args], usage)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = make()
+        end.wait()
+        node.begin()
+        begun = True
+        executor = make_executor(node, by_events=by_events)
+        if spin is not None:
+            spin(executor, node, lambda: end.came)
+        else:
+            serve(executor, node, lambda: end.came)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except _START_ERRORS as error:
+        if begun:
+            raise
+        if end.came:  # the interrupt, raised amid a call into C++, came out as another error
+            return
+        sys.stderr.write(f'{error}\n')
+        raise SystemExit(2) from None
+    finally:
+        _finish(node)
+
+
+def _take_no_words(args: list[str], usage: str) -> None:
+    """Answer `--help`, and refuse any other word: what is ignored would be taken for heard.
+
+    Raises:
+        SystemExit: After `--help`.
+        StartError: On a word that is no ROS argument.
+    """
+    words = remove_ros_args(args)[1:]
+    if '--help' in words or '-h' in words:
+        sys.stdout.write(f'{usage}\n')
+        raise SystemExit(0)
+    if words:
+        raise StartError(
+            f'There is no argument {words[0]!r}: a parameter is given as in '
+            '`--ros-args -p name:=value`, and --help lists them.'
+        )
+
+
+def _finish(node: ParameterNode | None) -> None:
+    """End a node, whatever fails on the way, and then rclpy."""
+    try:
+        if node is not None:
+            try:
+                _deliver(node)
+            finally:
+                node.finish()
+    finally:
+        end_within(_LETTING_GO, _exit_code())
+        try:
+            if node is not None:
+                time.sleep(_QUIET)
+                node.destroy_node()
+        finally:
+            rclpy.try_shutdown()
+
+
+def _exit_code() -> int:
+    """What the process ends with as things are: an error is on its way, or none is."""
+    error = sys.exc_info()[1]
+    if error is None:
+        return 0
+    return int(error.code or 0) if isinstance(error, SystemExit) else 1
+
+
+def _deliver(node: Node) -> None:
+    """Wait until readers have what was published: with its publishers a node's history goes."""
+    until = time.monotonic() + _DELIVERY
+    for publisher in node.publishers:
+        left = max(until - time.monotonic(), 0.0)
+        publisher.wait_for_all_acked(Duration(seconds=left))
+
+
+def serve(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:
+    """Serve a node until `ended` says so or its context is shut down.
+
+    Args:
+        executor: Calls the callbacks.
+        node: Whose.
+        ended: Looked at after each callback, and ten times a second while there is none.
+    """
+    executor.add_node(node)
+    try:
+        while node.context.ok() and not ended():
+            executor.spin_once(timeout_sec=LOOK_UP)
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()
+
+
+def make_executor(node: Node, *, by_events: bool = True) -> Executor:
+    """The executor of a node's process.
+
+    The one driven by events costs a third of the default one at 500 ticks a second. Its `spin`
+    fires no timer in the wheels of Jazzy, but `spin_once` is sound. It fails on subscriptions
+    whose callback takes the message info too: a node that has one needs the default.
+    """
+    kind = EventsExecutor if by_events and EventsExecutor is not None else SingleThreadedExecutor
+    return kind(context=node.context)

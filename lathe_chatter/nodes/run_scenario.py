@@ -1,0 +1,197 @@
+"""A cell of real nodes plays a scenario and is recorded: what `lathe-chatter run` starts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from lathe_chatter.nodes.deferred_signals import HeldSignals
+from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
+from lathe_chatter.nodes.parameters import LATHE
+from lathe_chatter.nodes.process_group import Cell, RunFailedError
+from lathe_chatter.scenario import Scenario
+
+_START_PATIENCE = 60.0
+"""s for the nodes to find each other: 20 where others keep the machine busy."""
+_DISCOVERY = 1.5
+"""s in which nodes that are there already become known."""
+_SETTLING = 0.3
+"""s in which the graph has heard that nodes have ended."""
+_OURS = {'lathe': 1, 'chatter_monitor': 1, 'run_recorder': 1, 'lathe_operator': 1}
+"""How many nodes of each name a run has."""
+_READERS = 3
+"""Recorder, monitor and operator: the lathe cuts nothing before it has met them all."""
+_GRACE = 10.0
+"""s of simulated time beyond a scenario's end for what the monitor is expected to say."""
+
+
+def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool:
+    """Start the cell, play, and end the cell.
+
+    Args:
+        scenario: What to play.
+        file: Of the scenario, to be kept in the run.
+        output: Folder of the run, to make.
+        console: Where to tell what happens.
+
+    Returns:
+        Whether it was interrupted.
+
+    Raises:
+        RunFailedError: If the domain has such nodes already, or one of ours fails.
+        ParameterError: If a parameter of the start is not allowed.
+    """
+    for name, value in scenario.parameters.items():
+        if name not in LATHE:
+            raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
+        LATHE[name].check(value)
+    try:
+        with HeldSignals() as held:
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            operator = Operator(scenario, tell=console.print)
+            executor = SingleThreadedExecutor()
+            executor.add_node(operator)
+
+            def spin() -> None:
+                executor.spin_once(timeout_sec=0.1)
+                held.heed()
+
+            try:
+                return _play(operator, spin, file, output, console)
+            finally:
+                _let_graph_settle(executor)
+                executor.shutdown()
+                operator.destroy_node()
+                rclpy.try_shutdown()
+    except KeyboardInterrupt:  # while the nodes were ending: they have ended in order
+        return True
+
+
+def _play(
+    operator: Operator, spin_once: Callable[[], None], file: Path, output: Path, console: Console
+) -> bool:
+    """Play with an operator who is there; whether it was interrupted."""
+    interrupted = False
+    with Cell() as cell:
+
+        def spin() -> None:
+            spin_once()
+            cell.check()
+
+        try:
+            with console.status('Starting the monitor and the recorder ...'):
+                _look_around(operator, spin)
+                cell.start(
+                    'run_recorder',
+                    'lathe_chatter.nodes.recorder_node',
+                    parameter_arguments(
+                        {'output': str(output), 'attachments': [str(file.resolve())]}
+                    ),
+                )
+                cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
+                _await_nodes(operator, spin)
+            cell.start(
+                'lathe',
+                'lathe_chatter.nodes.lathe_node',
+                parameter_arguments({'await_readers': _READERS, **operator.scenario.parameters}),
+            )
+            operator.playing = True
+            _follow(operator, spin, console)
+        except KeyboardInterrupt:
+            interrupted = True
+        complaints = cell.end()
+    if complaints:
+        raise RunFailedError(' '.join(complaints))
+    return interrupted
+
+
+def _let_graph_settle(executor: SingleThreadedExecutor) -> None:
+    """Wait until nobody is told any more that the nodes of the cell are gone.
+
+    Fast DDS may wait for itself for ever where a participant goes meanwhile (forced_end.py).
+    """
+    until = time.monotonic() + _SETTLING
+    while (left := until - time.monotonic()) > 0.0:
+        executor.spin_once(timeout_sec=left)
+
+
+def _look_around(operator: Operator, spin: Callable[[], None]) -> None:
+    """See for a while whether the domain is free, before anything is started in it."""
+    until = time.monotonic() + _DISCOVERY
+    while time.monotonic() < until:
+        spin()
+        _refuse_company(operator, {'lathe_operator': 1})
+
+
+def _refuse_company(operator: Operator, ours: Mapping[str, int] = _OURS) -> None:
+    """See that the domain has no nodes of our names but ours.
+
+    Raises:
+        RunFailedError: If it has: they would be taken for each other.
+    """
+    places = operator.get_node_names_and_namespaces()
+    names = [name for name, namespace in places if namespace == operator.get_namespace()]
+    other = next((name for name in _OURS if names.count(name) > ours.get(name, 0)), None)
+    if other is not None:
+        raise RunFailedError(
+            f'Another {other} is in this ROS domain already: end it, or set ROS_DOMAIN_ID to '
+            'another number.'
+        )
+
+
+def _await_nodes(operator: Operator, spin: Callable[[], None]) -> None:
+    """Wait until the recorder and the monitor are there, so that nothing of the lathe is lost."""
+    until = time.monotonic() + _START_PATIENCE
+    wanted = {'run_recorder', 'chatter_monitor'}
+    while not wanted <= set(operator.get_node_names()):
+        spin()
+        _refuse_company(operator)
+        if time.monotonic() > until:
+            missing = ' and '.join(sorted(wanted - set(operator.get_node_names())))
+            raise RunFailedError(f'{missing} did not appear within {_START_PATIENCE:.0f} s.')
+    _refuse_company(operator, {**_OURS, 'lathe': 0})
+
+
+def _follow(operator: Operator, spin: Callable[[], None], console: Console) -> None:
+    """Spin until the scenario is played, with a bar of simulated time."""
+    scenario = operator.scenario
+    columns = (
+        TextColumn('{task.completed:6.2f} of {task.total:.0f} s'),
+        BarColumn(bar_width=None),
+        TextColumn('{task.description}'),
+        TimeElapsedColumn(),
+    )
+    until = time.monotonic() + _START_PATIENCE
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task('waiting for the lathe', total=scenario.duration)
+        while not _finished(operator, scenario):
+            spin()
+            _refuse_company(operator)
+            if operator.failure is not None:
+                raise operator.failure
+            if operator.time == 0.0 and time.monotonic() > until:
+                raise RunFailedError(
+                    f'The lathe published no sample within {_START_PATIENCE:.0f} s.'
+                )
+            progress.update(
+                bar,
+                completed=min(operator.time, scenario.duration),
+                description=operator.state if operator.time else 'waiting for the lathe',
+            )
+
+
+def _finished(operator: Operator, scenario: Scenario) -> bool:
+    """Whether the time is over, and the monitor has said what is expected or will not."""
+    if operator.time < scenario.duration:
+        return False
+    pending = not operator.idle or any(
+        expected and word not in operator.said for word, expected in scenario.expect.items()
+    )
+    return not pending or operator.time >= scenario.duration + _GRACE

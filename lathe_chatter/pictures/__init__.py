@@ -1,7 +1,0 @@
-"""Pictures of runs, charts and maps: readable at a glance, the same colours throughout."""
-
-from __future__ import annotations
-
-from lathe_chatter.pictures.run import draw_run
-
-__all__ = ['draw_run']

@@ -1,0 +1,204 @@
+"""What happens in a run while it is being recorded, kept for the summary at its end.
+
+It looks at the numbers of messages that it knows and at nothing else of them; they are recorded
+as they came.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import Counter, deque
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lathe_chatter.errors import LayoutError
+from lathe_chatter.lathe.cut_events import BEGINNING, Change, parse_change
+from lathe_chatter.recording.ros_messages import LOG_TYPE, types
+from lathe_chatter.recording.sample_series import missing_in
+from lathe_chatter.samples.codec import SAMPLES_TYPE, Layout, layout_of
+from lathe_chatter.samples.continuity import Continuity, Joint
+
+FLAG_TYPE = 'std_msgs/msg/Bool'
+_FLAG_BYTE = 4
+"""Where the truth is in a serialised Bool, after the encapsulation."""
+_UNTOLD = 1000
+"""Seams that are kept for who tells of them."""
+_REMEMBERED = 1000
+"""Blocks about which it is known when they came, to date other messages by."""
+_SILENCE = 0.1
+"""s without a block that count as silence, where blocks usually come more often."""
+_SLOWER = 10.0
+"""So many times longer than usual must a silence be."""
+
+
+class Seam(NamedTuple):
+    """Where samples do not simply follow those before.
+
+    Attributes:
+        joint: What is there instead.
+        before: Simulated time of the last sample before, s; None before the first.
+        after: Of the first after it, s.
+        missing: How many samples of the lathe are missing there.
+    """
+
+    joint: Joint
+    before: float | None
+    after: float
+    missing: int
+
+
+@dataclass
+class SamplesHeard:
+    """The samples of one lathe, by their own times.
+
+    Attributes:
+        continuity: Counts samples, gaps, lost samples and restarts.
+        first: Simulated time of the first sample, s; None before it.
+        head: Samples that the lathe took before the first one that came.
+        silences: How often it published nothing for much longer than usual.
+        longest: The longest time from one block to the next, s.
+        complaint: What is wrong with the layout of a message; empty where all is well.
+        seams: The latest places where samples are missing or begin; for who tells of them to
+            take away.
+    """
+
+    continuity: Continuity = field(default_factory=Continuity)
+    first: float | None = None
+    head: int = 0
+    silences: int = 0
+    longest: float = 0.0
+    complaint: str = ''
+    seams: deque[Seam] = field(default_factory=lambda: deque(maxlen=_UNTOLD))
+    _layout: Layout | None = None
+    _beginning: bytes = b''
+    _published: int = 0
+    _usual: float = 0.0
+    _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
+
+    def hear(self, data: bytes, log_time: int, publish_time: int) -> None:
+        """Follow a block of samples, serialised; times in ns since the epoch."""
+        try:
+            times = self._times(data)
+        except LayoutError as error:
+            self.complaint = str(error)
+            return
+        if not len(times):
+            return
+        if not np.isfinite(times).all():
+            self.complaint = 'The times of samples are no numbers.'
+            return
+        last = float(times[-1])
+        self._join(times)
+        self._came.append((log_time, last))
+        self._follow(publish_time)
+
+    def _join(self, times: Any) -> None:
+        """Join a block by its times (n,), s."""
+        before, lost = self.continuity.last, self.continuity.lost
+        joint = self.continuity.join(times)
+        if joint is Joint.CONTIGUOUS:
+            return
+        first, missing = float(times[0]), self.continuity.lost - lost
+        if joint is not Joint.GAP:
+            step = (float(times[-1]) - first) / (len(times) - 1) if len(times) > 1 else first
+            missing = max(missing_in((0.0, first), step), 0) if step > 0.0 else 0
+        if joint is Joint.FIRST:
+            self.first, self.head = first, missing
+        self.seams.append(Seam(joint, before, first, missing))
+
+    def time_at(self, log_time: int) -> float:
+        """Simulated time when another message was received, s: that of the block about then."""
+        place = bisect_left(self._came, (log_time, 0.0))
+        return self._came[min(place, len(self._came) - 1)][1] if self._came else 0.0
+
+    def _times(self, data: bytes) -> Any:
+        layout = self._layout
+        if layout is None or not data.startswith(self._beginning):
+            layout = self._layout = layout_of(data)
+            self._beginning = data[: layout.start]
+            if 'time' not in layout.columns:
+                self._layout = None
+                raise LayoutError('The samples have no column time.')
+        width = len(layout.columns)
+        if len(data) < layout.start + layout.size:
+            raise LayoutError('A message of samples is cut off or no Float64MultiArray.')
+        numbers = np.frombuffer(data, '<f8', layout.rows * width, layout.start)
+        return numbers[layout.columns.index('time') :: width]
+
+    def _follow(self, publish_time: int) -> None:
+        """Notice silences, by the clock of who publishes."""
+        if self._published:
+            passed = (publish_time - self._published) / 1e9
+            self.longest = max(self.longest, passed)
+            if self._usual and passed > max(_SILENCE, _SLOWER * self._usual):
+                self.silences += 1
+            else:
+                self._usual += 0.1 * (passed - self._usual) if self._usual else passed
+        self._published = publish_time
+
+
+@dataclass
+class Start:
+    """A lathe from one start of its process to the next.
+
+    Attributes:
+        begun: When it said so, ns since the epoch; 0 where it did not.
+        changes: Of its cut, in order.
+    """
+
+    begun: int = 0
+    changes: list[Change] = field(default_factory=list)
+
+
+@dataclass
+class Journal:
+    """What happened so far.
+
+    Attributes:
+        messages: By name of topic.
+        samples: By name of topic.
+        flags: Simulated time, topic and truth of each change of a monitor's flag.
+        starts: Of each logger that told of a cut: at least one.
+    """
+
+    messages: Counter[str] = field(default_factory=Counter)
+    samples: dict[str, SamplesHeard] = field(default_factory=dict)
+    flags: list[tuple[float, str, bool]] = field(default_factory=list)
+    starts: dict[str, list[Start]] = field(default_factory=dict)
+    _flag: dict[str, bool] = field(default_factory=dict)
+
+    def hear(self, topic: str, kind: str, data: bytes, log_time: int, publish_time: int) -> None:
+        """Note a message of a topic, serialised; times in ns since the epoch."""
+        self.messages[topic] += 1
+        if kind == SAMPLES_TYPE and topic.endswith('/samples'):
+            self.samples.setdefault(topic, SamplesHeard()).hear(data, log_time, publish_time)
+        elif kind == FLAG_TYPE and topic.endswith('/chatter') and len(data) > _FLAG_BYTE:
+            self._hear_flag(topic, bool(data[_FLAG_BYTE]), log_time)
+        elif kind == LOG_TYPE:
+            self._hear_log(data, publish_time)
+
+    def _hear_flag(self, topic: str, up: bool, log_time: int) -> None:  # noqa: FBT001 -- it is one
+        if up != self._flag.get(topic, False):
+            self._flag[topic] = up
+            of_the_lathe = next(iter(self.samples.values()), None)
+            time = of_the_lathe.time_at(log_time) if of_the_lathe else 0.0
+            self.flags.append((time, topic, up))
+
+    def _hear_log(self, data: bytes, publish_time: int) -> None:
+        message = types().deserialize_cdr(data, LOG_TYPE)
+        change, begins = parse_change(message.msg), message.msg == BEGINNING
+        if change is None and not begins:
+            return
+        starts = self.starts.setdefault(message.name, [Start()])
+        if change is not None:
+            starts[-1].changes.append(change)
+        elif starts[-1].begun or starts[-1].changes:
+            starts.append(Start(publish_time))
+        else:
+            starts[-1].begun = publish_time
+
+    def starts_of(self, lathe: str) -> list[Start]:
+        """What a lathe, by the full name of its node, told; one where it told nothing."""
+        return self.starts.get(lathe.lstrip('/').replace('/', '.'), [Start()])

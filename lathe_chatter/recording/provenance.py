@@ -1,0 +1,107 @@
+"""What a run knows about its making: versions and machine."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from lathe_chatter import __version__
+
+IDENTITY = 'lathe_chatter/made_by'
+"""Name of the MCAP metadata record in each file of a run."""
+PARAMETERS = 'lathe_chatter/parameters'
+"""Name of the records of a node's parameters, followed by its full name; values as JSON.
+
+Of a node that was started again also those of its next lives, `parameters_2` and so on.
+"""
+
+RECEPTION = 'lathe_chatter/reception'
+"""Name of the record of what came and what was lost on the way, by topic, as JSON."""
+
+PUBLISHERS = 'lathe_chatter/publishers'
+"""Name of the record of how many publishers each topic had at most, as JSON."""
+
+STALLS = 'stalls'
+"""Among these, how often the recorder took too long to take what had come."""
+
+RECOVERED = 'lathe_chatter/recovered'
+"""Name of the record of a run that was recovered: from which, and what could not be read."""
+
+_CORE = (
+    'arrays.py',
+    'compiled.py',
+    'lathe/integrator/*.py',
+    'lathe/setup.py',
+    'lathe/state.py',
+    'lathe/virtual_lathe.py',
+    'model/cut.py',
+    'model/machine.py',
+    'model/quantities.py',
+)
+"""What the bits of a sample depend on; a test holds that the lathe imports nothing else."""
+
+
+def core_identity() -> dict[str, str]:
+    """What the bits of a simulated sample depend on: the code of the lathe, and below it."""
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    for pattern in _CORE:
+        for file in sorted(package.glob(pattern)):
+            digest.update(file.read_bytes())
+    return {
+        'lathe_chatter': __version__,
+        'core': digest.hexdigest()[:16],
+        **{name: version(name) for name in ('numpy', 'scipy', 'numba', 'llvmlite')},
+        'machine': platform.machine(),
+    }
+
+
+def identity() -> dict[str, str]:
+    """Who records, on what, since when."""
+    return {
+        **core_identity(),
+        'mcap': version('mcap'),
+        'python': platform.python_version(),
+        'system': f'{platform.system()} {platform.release()}',
+        'processors': str(os.cpu_count()),
+        'host': platform.node(),
+        'command': ' '.join(sys.argv),
+        'started': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
+    }
+
+
+def parameter_values(lives: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:
+    """The values of a record of parameters.
+
+    Args:
+        lives: The parameters of a node, and of the nodes of its name that came after it, each
+            with the time at which it told them, ns since the epoch.
+    """
+    values: dict[str, str] = {}
+    for k, (parameters, log_time) in enumerate(lives):
+        suffix = f'_{k + 1}' if k else ''
+        values[f'parameters{suffix}'] = json.dumps(dict(parameters))
+        values[f'log_time{suffix}'] = str(log_time)
+    return values
+
+
+def lives_in(values: Mapping[str, str]) -> Iterator[tuple[dict[str, Any], int]]:
+    """What `parameter_values` was given, as far as it is legible."""
+    for name, text in values.items():
+        if not name.startswith('parameters'):
+            continue
+        try:
+            parameters = json.loads(text)
+            log_time = int(values.get(name.replace('parameters', 'log_time'), '0'))
+        except ValueError:
+            continue
+        if isinstance(parameters, dict):
+            yield parameters, log_time

@@ -1,0 +1,296 @@
+"""`read_run`: a recorded run as arrays and messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import MCAP0_MAGIC
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from lathe_chatter.recording.bag_folder import RunFolder, RunReadError, run_folder
+from lathe_chatter.recording.chunk_messages import Messages, joined_messages
+from lathe_chatter.recording.dataframes import to_pandas, to_xarray
+from lathe_chatter.recording.mcap_reader import Damage
+from lathe_chatter.recording.raw_messages import Raw, Recorded, raw_of
+from lathe_chatter.recording.run_file import Contents, Note, RecordedFile
+from lathe_chatter.recording.sample_columns import Cut, cut_of
+from lathe_chatter.recording.sample_selection import chosen_columns, chosen_range
+from lathe_chatter.recording.sample_series import Samples, joined
+from lathe_chatter.recording.sample_threads import cuts_by_index
+from lathe_chatter.samples.codec import SAMPLES_TYPE, Blocks, blocks_of
+
+__all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
+
+_REST = 'What is left of it can be saved by `lathe-chatter recover`.'
+_CHUNKS_AT_ONCE = 16
+"""Arrays of a single chunk are so small that calls would cost more than their work."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A recorded run; nothing is read before it is asked for, and everything read has its CRC.
+
+    Attributes:
+        path: As it was given.
+        files: The MCAP files in order.
+        damaged: Whether what is left of damaged files is wanted; else they raise.
+        damage: What could not be read so far, where `damaged`.
+        folder: What its folder holds; None where it is one file.
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+    damaged: bool = False
+    damage: list[Damage] = field(default_factory=list)
+    folder: RunFolder | None = None
+
+    @cached_property
+    def topics(self) -> dict[str, str]:
+        """The type of each topic by name.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
+        found: dict[str, str] = {}
+        for file in self._opened():
+            if not file.has_summary:
+                end = file.path.stat().st_size
+                self._on_damage(Damage(file.path, end, end, 'it has no sound summary'))
+            found |= file.topics()
+        return found
+
+    def notes(self) -> list[Note]:
+        """What was noted beside the messages, in every file, in order."""
+        return [note for file in self._opened() for note in file.notes()]
+
+    def attachments(self) -> list[Any]:
+        """Files that were kept in the run, as mcap has them: name, media_type, data."""
+        return [each for file in self._opened() for each in file.attachments()]
+
+    def contents(self) -> Iterator[tuple[RecordedFile, Contents]]:
+        """The messages of each chunk of each file, as arrays, in the order of the files.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
+        for file in self._opened():
+            for contents in file.contents():
+                yield file, contents
+
+    def count_of_messages(self) -> int:
+        """How many messages the files say that they have; 0 where they do not say."""
+        known = [file.known.statistics for file in self._opened()]
+        return sum(statistics.message_count for statistics in known if statistics is not None)
+
+    def raw_messages(self, *topics: str) -> Iterator[Raw]:
+        """The messages of some topics, or of all if none is named, as they are in the file.
+
+        In order of reception, also where chunks overlap.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
+        for file in self._opened():
+            waiting: list[Raw] = []
+            for contents in file.contents():
+                ready = [raw for raw in waiting if raw.log_time < contents.first]
+                if ready:
+                    yield from ready
+                    waiting = waiting[len(ready) :]
+                found = raw_of(file, contents.messages, topics)
+                waiting = sorted([*waiting, *found], key=lambda raw: raw.log_time)
+            yield from waiting
+
+    def messages(self, *topics: str) -> Iterator[Recorded]:
+        """The messages of some topics in order of reception, decoded.
+
+        Raises:
+            RunReadError: If a file is damaged.
+        """
+        store = get_typestore(Stores.ROS2_JAZZY)
+        known = set(store.fielddefs)
+        for raw in self.raw_messages(*topics):
+            if raw.type not in known:
+                definition = self._definition(raw.type)
+                store.register(get_types_from_msg(definition, raw.type))
+                known.add(raw.type)
+            message = store.deserialize_cdr(raw.data, raw.type)
+            yield Recorded(raw.topic, raw.log_time, raw.sequence, message, raw.publish_time)
+
+    def sample_blocks(self, topic: str | None = None) -> Iterator[Blocks]:
+        """The samples of a lathe as they were recorded, some 4 s at a time.
+
+        Raises:
+            RunReadError: If a file is damaged, or there are several lathes and no topic is named.
+            LayoutError: If a message is no block of samples.
+        """
+        name = topic or self.samples_topic()
+        for file in self._opened():
+            yield from _blocks(file, name)
+
+    def samples(
+        self,
+        topic: str | None = None,
+        *,
+        columns: Iterable[str] | None = None,
+        start: float = -np.inf,
+        end: float = np.inf,
+    ) -> Samples:
+        """The samples of a lathe, joined.
+
+        Args:
+            topic: Of the samples; may be left out where the run has one lathe.
+            columns: Which signals; all by default.
+            start: Simulated time of the first wanted, s.
+            end: Simulated time of the last wanted, s.
+
+        Raises:
+            ParameterError: If columns or times are no such thing.
+            RunReadError: If a file is damaged, there are no samples, no such columns, or several
+                lathes and no topic is named.
+            LayoutError: If a message is no block of samples.
+        """
+        name = topic or self.samples_topic()
+        wanted = chosen_columns(columns)
+        start, end = chosen_range(start, end)
+        files = [*self._opened()]
+        expected = sum(file.count(name) for file in files)
+        found = joined(_cuts(files, name, wanted), expected, start, end)
+        if found is None:
+            raise self.without_samples(name)
+        if wanted is not None and set(wanted) - set(found.columns):
+            missing = ', '.join(sorted(set(wanted) - set(found.columns)))
+            raise RunReadError(f'The samples of {name} in {self.path} have no column {missing}.')
+        return found
+
+    def without_samples(self, topic: str) -> RunReadError:
+        """The error of a topic that has no samples: it says which have."""
+        kinds = self.topics.items()
+        others = sorted(name for name, kind in kinds if kind == SAMPLES_TYPE and name != topic)
+        hint = f': those that it has are of {", ".join(others)}.' if others else '.'
+        return RunReadError(f'{self.path} holds no samples of the topic {topic}{hint}')
+
+    def count_of_samples(self, topic: str | None = None) -> int | None:
+        """About how many samples a lathe has here; None where the files do not say."""
+        name = topic or self.samples_topic()
+        blocks = sum(file.count(name) for file in self._opened())
+        first = next(iter(self.sample_blocks(name)), None) if blocks else None
+        return None if first is None else blocks * int(first.rows[0])
+
+    def to_pandas(self, **chosen: Any) -> Any:
+        """The samples as a pandas DataFrame by simulated time; see `frames.to_pandas`.
+
+        Args:
+            chosen: Topic, columns, start and end, as for `samples`.
+
+        Raises:
+            MissingPackageError: If pandas is not installed.
+            RunReadError: As `samples`.
+        """
+        return to_pandas(self, **chosen)
+
+    def to_xarray(self, **chosen: Any) -> Any:
+        """The samples as an xarray Dataset over simulated time; see `frames.to_xarray`.
+
+        Args:
+            chosen: Topic, columns, start and end, as for `samples`.
+
+        Raises:
+            MissingPackageError: If xarray is not installed.
+            RunReadError: As `samples`.
+        """
+        return to_xarray(self, **chosen)
+
+    def samples_topic(self) -> str:
+        """The topic of the samples, where the run has one lathe.
+
+        Raises:
+            RunReadError: If it has none, or several.
+        """
+        names = sorted(
+            name
+            for name, kind in self.topics.items()
+            if name.endswith('/samples') and kind == SAMPLES_TYPE
+        )
+        if not names:
+            raise RunReadError(f'{self.path} holds no samples of a lathe.')
+        if len(names) > 1:
+            raise RunReadError(f'{self.path} holds several lathes, {", ".join(names)}: name one.')
+        return names[0]
+
+    def _opened(self) -> Iterator[RecordedFile]:
+        for path in self.files:
+            yield RecordedFile(path, self._on_damage)
+
+    def _on_damage(self, damage: Damage) -> None:
+        if not self.damaged:
+            raise RunReadError(
+                f'{damage.file} is damaged at byte {damage.start}: {damage.reason}. {_REST}'
+            )
+        if damage not in self.damage:
+            self.damage.append(damage)
+
+    def _definition(self, kind: str) -> str:
+        for file in self._opened():
+            for schema in file.known.schemas.values():
+                if schema.name == kind:
+                    return str(schema.data.decode())
+        raise RunReadError(f'{self.path} does not say what a {kind} is.')
+
+
+def _cuts(
+    files: Iterable[RecordedFile], topic: str, wanted: tuple[str, ...] | None
+) -> Iterator[Cut]:
+    """Columns of the samples of a topic, by the quickest way that each file allows."""
+    for file in files:
+        cuts = cuts_by_index(file, topic, wanted)
+        if cuts is None:
+            cuts = (cut_of(blocks, wanted) for blocks in _blocks(file, topic))
+        yield from cuts
+
+
+def _blocks(file: RecordedFile, topic: str) -> Iterator[Blocks]:
+    """The samples of a topic in a file, some 4 s at a time."""
+    waiting: list[Messages] = []
+    for contents in file.contents():
+        numbers = [n for n, channel in file.known.channels.items() if channel.topic == topic]
+        waiting += [contents.messages.of(number) for number in numbers]
+        if len(waiting) >= _CHUNKS_AT_ONCE:
+            yield from blocks_of(joined_messages(waiting))
+            waiting.clear()
+    if waiting:
+        yield from blocks_of(joined_messages(waiting))
+
+
+def _begins_as_mcap(path: Path) -> bool:
+    with path.open('rb') as stream:
+        return stream.read(len(MCAP0_MAGIC)) == bytes(MCAP0_MAGIC)
+
+
+def read_run(path: Path | str, *, damaged: bool = False) -> Run:
+    """Open a recorded run.
+
+    Args:
+        path: A rosbag2 folder with MCAP files, or one MCAP file.
+        damaged: Whether to hand out what is left of damaged files, instead of raising; what is
+            missing is then in `Run.damage`, and among the gaps of the samples.
+
+    Raises:
+        RunReadError: If there is no such run, or a file of it is missing.
+    """
+    path = Path(path)
+    if path.is_file():
+        if path.suffix != '.mcap' and not _begins_as_mcap(path):
+            raise RunReadError(f'{path} is no MCAP file.')
+        return Run(path, (path,), damaged)
+    found = run_folder(path)
+    absent = [Damage(path / name, 0, 0, 'the file is missing') for name in found.missing]
+    if absent and not damaged:
+        names = ', '.join(found.missing)
+        raise RunReadError(f'{path} lacks {names}. {_REST}')
+    return Run(path, found.files, damaged, absent, found)

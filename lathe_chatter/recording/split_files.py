@@ -1,0 +1,221 @@
+"""The files of a run that is being written: pieces, what each begins with, and metadata.yaml."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+import time
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.recording.disk_sync import BackgroundSync
+from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
+from lathe_chatter.recording.metadata import FileCount, describe, dump, replace_file
+from lathe_chatter.recording.open_chunk import OpenChunk
+from lathe_chatter.recording.topic_records import TopicRecords
+
+CLOSED = 'lathe_chatter/closed'
+"""Name of the MCAP metadata record that ends each file of a run; a killed recorder leaves none.
+
+`next` is the file in which the run goes on, empty in the last; `messages` the counts by topic so
+far, as JSON."""
+
+
+class RunExistsError(LatheChatterError):
+    """The folder of a new run exists already: nothing recorded is ever overwritten."""
+
+    def __init__(self, folder: Path) -> None:
+        """Name the folder."""
+        self.folder = folder
+        super().__init__(f'{folder} exists already, and no recorded run is overwritten.')
+
+
+class DiskFullError(LatheChatterError):
+    """The disk has too little room left to go on."""
+
+    def __init__(self, folder: Path, free: int, wanted: int) -> None:
+        """Name the folder, what is free on its disk and what must be, in bytes."""
+        self.folder = folder
+        super().__init__(
+            f'The disk of {folder} has {free / 1e6:.1f} MB left and {wanted / 1e6:.1f} MB must '
+            'stay free: the recording ends, complete up to here.'
+        )
+
+
+class _Piece(NamedTuple):
+    """A file of the run that is finished, or will be when the disk has caught up."""
+
+    name: str
+    contents: Contents
+    sync: BackgroundSync
+
+
+class RunFiles:
+    """Writes chunks, notes and attachments into files that follow each other.
+
+    Args:
+        folder: To make.
+        distribution: Of ROS, for metadata.yaml.
+        min_free_space: Bytes that the disk must keep.
+        split_duration: s of recording in one file before the next is begun.
+        split_size: Bytes, likewise.
+
+    Raises:
+        RunExistsError: If the folder exists.
+        OSError: If it cannot be made or written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        distribution: str,
+        *,
+        min_free_space: int,
+        split_duration: float,
+        split_size: float,
+    ) -> None:
+        """Make the folder with a first, empty file and its metadata."""
+        self._folder = folder
+        self._distribution = distribution
+        self._min_free_space = min_free_space
+        self._split_duration = split_duration
+        self._split_size = split_size
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            raise RunExistsError(folder) from None
+        self._pieces: list[_Piece] = []
+        self._topics: list[TopicRecords] = []
+        self._notes: dict[str, Mapping[str, str]] = {}
+        self._described = True
+        self._open_file()
+
+    def add_topic(self, records: TopicRecords) -> None:
+        """Announce a topic, in the order of the numbers of their channels."""
+        self._topics.append(records)
+        self._file.add_channel(records.schema, records.channel)
+        self._described = False
+
+    def add_chunk(self, chunk: OpenChunk) -> None:
+        """Add the messages of a chunk."""
+        self._file.add_chunk(chunk)
+
+    def note(self, name: str, values: Mapping[str, str]) -> None:
+        """Keep named values, in this file and those that follow."""
+        self._notes[name] = values
+        self._file.add_metadata(name, values)
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Attach a file of another kind."""
+        self._file.attach(name, media_type, data, time.time_ns())
+
+    def commit(self) -> None:
+        """Leave a complete file on disk with everything added so far; split where it is time.
+
+        Raises:
+            DiskFullError: If less than `min_free_space` is left on the disk.
+            OSError: If the disk refuses; the file stays as the commit before left it.
+        """
+        self._file.commit()
+        if not self._described:
+            self._describe()
+        held = self._file.committed
+        if held.last - held.first >= self._split_duration * 1e9 or (
+            self._file.size >= self._split_size and held.chunks
+        ):
+            self.split()
+        free = shutil.disk_usage(self._folder).free
+        if free < self._min_free_space:
+            raise DiskFullError(self._folder, free, self._min_free_space)
+
+    def split(self) -> None:
+        """Go on in a new file.
+
+        Raises:
+            OSError: If the disk refuses.
+        """
+        self._end_file(self._name(len(self._pieces) + 1))
+        self._open_file()
+
+    def close(self) -> None:
+        """Finish the files and the metadata.
+
+        Raises:
+            OSError: If the disk refuses; every file stays as its last commit left it.
+        """
+        try:
+            self._end_file('')
+            for piece in self._pieces:
+                piece.sync.join()
+        finally:
+            self._describe()
+
+    def abandon(self) -> None:
+        """Leave everything as the last commit left it: the disk takes no more."""
+        self._file.abandon()
+        with contextlib.suppress(OSError):
+            self._describe()
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Messages on disk by name of topic."""
+        names = {k + 1: records.topic.name for k, records in enumerate(self._topics)}
+        total: Counter[str] = Counter()
+        for _, contents in self._files():
+            for number, count in contents.counts.items():
+                total[names[number]] += count
+        return total
+
+    @property
+    def safe_messages(self) -> int:
+        """How many messages no loss of power can take any more."""
+        finished = sum(piece.sync.messages for piece in self._pieces)
+        return finished + (self._file.safe_messages if len(self._pieces) < self._begun else 0)
+
+    def _name(self, number: int) -> str:
+        return f'{self._folder.name}_{number}.mcap'
+
+    def _files(self) -> list[tuple[str, Contents]]:
+        """Every file with what it holds on disk; the last is the one that is written to."""
+        finished = [(piece.name, piece.contents) for piece in self._pieces]
+        if len(finished) < self._begun:
+            finished.append((self._name(len(finished)), self._file.committed))
+        return finished
+
+    def _open_file(self) -> None:
+        """Begin a file, with all that is known, and say so in the metadata."""
+        self._file = CommittedFile(self._folder / self._name(len(self._pieces)))
+        self._begun = len(self._pieces) + 1
+        # In the same order, so with the same numbers in every file.
+        for records in self._topics:
+            self._file.add_channel(records.schema, records.channel)
+        for name, values in self._notes.items():
+            self._file.add_metadata(name, values)
+        self._describe()
+
+    def _end_file(self, next_name: str) -> None:
+        """Close the file: what it holds, where the run goes on, and what rosbag2 wants to know."""
+        self._file.commit()
+        counts = json.dumps(dict(sorted(self.counts.items())))
+        self._file.add_metadata(CLOSED, {'next': next_name, 'messages': counts})
+        self._file.add_metadata('rosbag2', {'serialized_metadata': self._description()})
+        name = self._name(len(self._pieces))
+        sync = self._file.close(wait=False)
+        self._pieces.append(_Piece(name, self._file.committed, sync))
+
+    def _description(self) -> str:
+        files = [
+            FileCount(name, held.first, held.last, sum(held.counts.values()))
+            for name, held in self._files()
+        ]
+        topics = [records.topic for records in self._topics]
+        values = describe(files, topics, self.counts, self._distribution)
+        return dump(values)
+
+    def _describe(self) -> None:
+        replace_file(self._folder, self._description())
+        self._described = True

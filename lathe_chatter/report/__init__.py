@@ -1,0 +1,7 @@
+"""Pictures of runs, charts and maps: readable at a glance, the same colours throughout."""
+
+from __future__ import annotations
+
+from lathe_chatter.report.run_picture import draw_run
+
+__all__ = ['draw_run']

@@ -1,0 +1,120 @@
+"""The knock that a cut survives, over speed and depth or over clearance."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lathe_chatter.knocks import KnockMap, Margin
+from lathe_chatter.knocks.knock_map import Point
+from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
+from lathe_chatter.report.style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save
+from lathe_chatter.stability import safe_limit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MILLI, _MICRO = 1e3, 1e6
+
+
+def draw_knock_map(knocks: KnockMap, path: Path) -> None:
+    """Draw a map as PNG and SVG, one panel for each clearance, or a curve over clearance."""
+    grid_of = knocks.grid
+    if len(grid_of.speeds) > 1 and len(grid_of.depths) > 1:
+        panels = len(grid_of.clearances)
+        figure = new_figure(11.0, 1.0 + 5.0 * panels)
+        for axes, clearance in zip(
+            figure.subplots(panels, squeeze=False)[:, 0], grid_of.clearances, strict=True
+        ):
+            _draw_plane(axes, knocks, clearance)
+    else:
+        figure = new_figure(9.0, 5.5)
+        _draw_curves(figure.subplots(), knocks)
+    save(figure, path)
+
+
+def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
+    """Impulse as colour over speed and depth, with the limits of the chart."""
+    from matplotlib.colors import ListedColormap, LogNorm
+
+    of = knocks.grid
+    speeds, depths = np.array(of.speeds), np.array(of.depths) * _MILLI
+    impulse = np.full((depths.size, speeds.size), np.nan)
+    kind = np.full(impulse.shape, np.nan)
+    for row, depth in enumerate(of.depths):
+        for column, speed in enumerate(of.speeds):
+            limit = knocks.limits.get(Point(speed, depth, clearance))
+            if limit is None:
+                continue
+            if limit.margin is Margin.FINITE:
+                impulse[row, column] = abs(limit.impulse) * _MILLI
+            else:
+                kind[row, column] = float(limit.margin is Margin.UNSTABLE)
+    axes.pcolormesh(
+        speeds, depths, kind, cmap=ListedColormap(['#D8F0E7', '#DDDDDD']), vmin=0.0, vmax=1.0,
+        shading='nearest', rasterized=True,
+    )  # fmt: skip
+    if np.isfinite(impulse).any():
+        low, high = float(np.nanmin(impulse)), float(np.nanmax(impulse))
+        colours = axes.pcolormesh(
+            speeds, depths, impulse, cmap='inferno', norm=LogNorm(low, max(high, 1.01 * low)),
+            shading='nearest', rasterized=True,
+        )  # fmt: skip
+        axes.figure.colorbar(colours, ax=axes, label='smallest lasting knock / (mN s)', pad=0.01)
+    cut = of.start.cut.with_changes(bearing_clearance=clearance)
+    limits = safe_limit(of.start.machine, cut, chart_speeds(speeds[0], speeds[-1]))
+    draw_limits(axes, limits, cut.bearing_contact, of.depths[-1], shade=False)
+    axes.set_ylim(depths[0] - 0.5 * (depths[1] - depths[0]), depths[-1])
+    axes.fill_between([], [], color='#D8F0E7', label='no lasting knock found')
+    axes.fill_between([], [], color='#DDDDDD', label='chatters unknocked')
+    axes.legend(
+        loc='upper center', bbox_to_anchor=(0.5, -0.13), ncols=5, fontsize=9, frameon=False
+    )
+    axes.set_title(f'The knock that a cut survives: clearance {clearance * _MICRO:g} µm', size=11)
+
+
+def _draw_curves(axes: Axes, knocks: KnockMap) -> None:
+    """Impulse over whichever of clearance, speed and depth varies."""
+    of = knocks.grid
+    name, factor, label, values = 'bearing_clearance', _MICRO, 'clearance / µm', of.clearances
+    if len(of.speeds) > 1:
+        name, factor, label, values = (
+            'spindle_speed_rpm', 1.0, 'spindle speed / (rev/min)', of.speeds,
+        )  # fmt: skip
+    elif len(of.depths) > 1:
+        name, factor, label, values = 'depth_of_cut', _MILLI, 'depth of cut / mm', of.depths
+    points = [point for point in of.points() if point in knocks.limits]
+    x = np.array([getattr(point, name) * factor for point in points])
+    limits = [knocks.limits[point] for point in points]
+    shown = np.array([lim.impulse if lim.margin is Margin.FINITE else math.nan for lim in limits])
+    axes.plot(x, np.abs(shown) * _MILLI, 'o-', color=SEATED, ms=4, label='smallest lasting knock')
+    linear = np.array([limit.linear if limit.linear > 0.0 else math.nan for limit in limits])
+    axes.plot(x, linear * _MILLI, '-', color=OPEN, lw=1.2, label='below: dies out for sure')
+    tried = np.array(
+        [lim.searched if lim.margin is Margin.NONE_FOUND else math.nan for lim in limits]
+    )
+    axes.plot(x, tried * _MILLI, '^', color=SAFE, ms=6, label='none lasts up to here')
+    unstable = np.array([limit.margin is Margin.UNSTABLE for limit in limits])
+    half = 0.5 * np.diff(x).min() if x.size > 1 else 0.5
+    for k, place in enumerate(x[unstable].tolist()):
+        axes.axvspan(
+            place - half, place + half, color=ALARM, alpha=0.3, lw=0,
+            label='chatters unknocked' if k == 0 else None,
+        )  # fmt: skip
+    axes.set_yscale('log')
+    axes.set_xlim(min(values) * factor - half, max(values) * factor + half)
+    axes.set_xlabel(label)
+    axes.set_ylabel('impulse on the tool / (mN s)')
+    first = points[0] if points else Point(of.speeds[0], of.depths[0], of.clearances[0])
+    parts = {
+        'spindle_speed_rpm': f'{first.spindle_speed_rpm:g} rev/min',
+        'depth_of_cut': f'{first.depth_of_cut * _MILLI:g} mm',
+        'bearing_clearance': f'clearance {first.bearing_clearance * _MICRO:g} µm',
+    }
+    fixed = ', '.join(text for key, text in parts.items() if key != name)
+    axes.set_title(f'The knock that a cut survives: {fixed}', size=11)
+    axes.legend(fontsize=9)
+    grid(axes)

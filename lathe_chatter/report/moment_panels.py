@@ -1,0 +1,132 @@
+"""What a cut is like at a moment: its phase portrait, its spectrum, once in every turn."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.report.history import History
+from lathe_chatter.report.signal_views import Moment
+from lathe_chatter.report.style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for
+from lathe_chatter.stability import contact_at, rightmost_root
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_BODIES = (('tool', TOOL, 'o'), ('workpiece', WORKPIECE, 's'))
+_HIGHEST = 600.0
+"""Hz that a spectrum shows."""
+_DECADES = 4.0
+_LEAST = 1e-6
+"""m: half an axis at least, and 1e-3 m/s. A cut at rest is a point: its rounding is no motion."""
+_LEAST_VELOCITY = 1e-3
+_FAINTEST = 1e-9
+"""m: what moves less is at rest: its spectrum would be one of rounding."""
+_TOP_AT_REST = 1e-6
+"""m: top of the empty spectrum of a cut at rest."""
+
+
+def draw_portrait(axes: Axes, history: History, moment: Moment) -> None:
+    """Phase portraits of tool and workpiece."""
+    del history
+    columns = moment.portrait
+    _draw_plane(
+        axes,
+        {
+            name: (columns[f'{name}_displacement'], columns[f'{name}_velocity'])
+            for name, _, _ in _BODIES
+        },
+        lines=True,
+    )
+    cut = moment.cut
+    axes.set_title(
+        f'{moment.title} (to {moment.until:.2f} s)\n{cut.spindle_speed_rpm:g} rev/min, '
+        f'{cut.depth_of_cut * 1e3:g} mm',
+        fontsize=10,
+    )
+    axes.legend(loc='upper right', frameon=False, fontsize=8)
+
+
+def draw_section(axes: Axes, history: History, moment: Moment) -> None:
+    """Displacement and velocity once per turn: a point for what repeats with the spindle."""
+    del history
+    sections = {name: moment.section(name) for name, _, _ in _BODIES}
+    _draw_plane(axes, {name: tuple(section) for name, section in sections.items()}, lines=False)
+    turns = len(sections['tool'].displacement)
+    axes.set_title(f'once per turn, {turns} turns', fontsize=10)
+
+
+def draw_spectrum(axes: Axes, history: History, moment: Moment) -> None:
+    """Amplitude spectra of both displacements, with the frequency that the root predicts."""
+    scale, top = Scale(1e6, 'µm'), 0.0
+    for name, colour, _ in _BODIES:
+        spectrum = moment.spectrum(f'{name}_displacement')
+        shown = (spectrum.frequency <= _HIGHEST) & (spectrum.amplitude > 0.0)
+        if not shown.any() or spectrum.amplitude[shown].max() < _FAINTEST:
+            continue
+        top = max(top, float(spectrum.amplitude[shown].max()))
+        axes.plot(
+            spectrum.frequency[shown], spectrum.amplitude[shown] * scale.factor,
+            color=colour, lw=0.9, label=name,
+        )  # fmt: skip
+    if not top:
+        _say_at_rest(axes, 'no amplitude above 1 nm')
+        top = _TOP_AT_REST
+    contact = contact_at(history.machine, moment.cut, tool_leaves_cut=history.tool_leaves_cut)
+    root = rightmost_root(
+        history.machine,
+        moment.cut.spindle_speed_rpm,
+        moment.cut.depth_of_cut,
+        seated=contact.seated,
+    )
+    expected = root.imag / (2.0 * math.pi)
+    axes.axvline(expected, color='k', lw=0.9, ls='--', label=f'root, {expected:.1f} Hz')
+    axes.axvline(moment.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')
+    axes.set_yscale('log')
+    axes.set_xlim(0.0, _HIGHEST)
+    axes.set_ylim(top * scale.factor * 10.0**-_DECADES, 3.0 * top * scale.factor)
+    axes.set_xlabel('frequency / Hz')
+    axes.set_ylabel(scale.label('amplitude'))
+    axes.legend(loc='upper right', frameon=False, fontsize=8)
+    grid(axes)
+
+
+def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool) -> None:
+    """Velocity over displacement of both bodies, as lines that end in a dot or as points."""
+    from matplotlib.colors import to_rgb
+
+    places = scale_for('m', _LEAST, *(pair[0] for pair in pairs.values()))
+    speeds = scale_for('m/s', _LEAST_VELOCITY, *(pair[1] for pair in pairs.values()))
+    for name, colour, marker in _BODIES:
+        place, velocity = pairs[name]
+        x, y = place * places.factor, velocity * speeds.factor
+        if lines:
+            axes.plot(x, y, color=colour, lw=0.8, label=name, marker=marker, ms=3, markevery=[-1])
+            continue
+        # From faint to full: whether the points run in or out is then plain.
+        shades = [(*to_rgb(colour), alpha) for alpha in np.linspace(0.15, 1.0, x.size).tolist()]
+        axes.scatter(x, y, s=9, color=shades, marker=marker, lw=0)
+    _widen(axes, _LEAST * places.factor, _LEAST_VELOCITY * speeds.factor)
+    if all(x.size and float(np.ptp(x)) < _FAINTEST for x, _ in pairs.values()):
+        _say_at_rest(axes, 'both at rest, within 1 nm')
+    axes.set_xlabel(places.label('displacement'))
+    axes.set_ylabel(speeds.label('velocity'))
+    grid(axes)
+
+
+def _say_at_rest(axes: Axes, text: str) -> None:
+    """Say in the middle of a plot why it is empty."""
+    axes.text(0.6, 0.25, text, transform=axes.transAxes, ha='center', fontsize=9, color=NEUTRAL)
+
+
+def _widen(axes: Axes, least_x: float, least_y: float) -> None:
+    """Give both axes at least some width."""
+    for limits, setter, least in (
+        (axes.get_xlim(), axes.set_xlim, least_x),
+        (axes.get_ylim(), axes.set_ylim, least_y),
+    ):
+        middle, half = 0.5 * sum(limits), 0.5 * (limits[1] - limits[0])
+        setter(middle - max(half, least), middle + max(half, least))

@@ -1,0 +1,139 @@
+"""The stability chart: both limits, the seating line, and the safe region that they leave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.lathe.config import Start
+from lathe_chatter.model import BearingContact
+from lathe_chatter.report.style import LINE, OPEN, SAFE, SEATED, grid, new_figure, save
+from lathe_chatter.stability import GrowthMap, SafeLimit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SPEEDS = 800
+_MILLI = 1e3
+
+
+def chart_speeds(low_rpm: float, high_rpm: float) -> Array:
+    """Speeds for a chart, denser where the lobes are: even in 1/speed and in speed by halves."""
+    even = np.linspace(low_rpm, high_rpm, _SPEEDS // 2)
+    by_delay = 1.0 / np.linspace(1.0 / high_rpm, 1.0 / low_rpm, _SPEEDS // 2)
+    speeds: Array = np.unique(np.concatenate((even, np.clip(by_delay, low_rpm, high_rpm))))
+    return speeds
+
+
+def draw_lobes(
+    start: Start, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
+) -> None:
+    """Draw a chart with its point of operation, as PNG and SVG.
+
+    Args:
+        start: The machine and its cut.
+        limits: Over rising speeds.
+        growth: To colour the chart with, or None.
+        depth_limit: Top of the chart, m.
+        path: Of the PNG file.
+    """
+    figure = new_figure(11.0, 6.0)
+    axes = figure.subplots()
+    cut = start.cut
+    varied = cut.speed_variation_amplitude > 0.0
+    if growth is not None:
+        _draw_growth(axes, growth, zero=varied)
+    draw_limits(axes, limits, cut.bearing_contact, depth_limit, shade=growth is None)
+    if cut.depth_of_cut <= depth_limit:
+        axes.plot(
+            cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
+            ms=7, label='the cut',
+        )  # fmt: skip
+    axes.legend(loc='upper center', ncols=5, fontsize=9, framealpha=0.9)
+    bearing = {
+        BearingContact.NONE: 'no bearing clearance',
+        BearingContact.GAP: f'clearance {cut.bearing_clearance * 1e6:g} µm, '
+        f'feed {cut.feed_speed * 1e3:g} mm/s',
+        BearingContact.SEATED: 'on its bearing',
+    }[cut.bearing_contact]
+    text = f'Stability chart: {bearing}'
+    if varied:
+        text += (
+            f'; colours and heavy line: speed varied by {cut.speed_variation_amplitude:.0%} at '
+            f'{cut.speed_variation_frequency:g} Hz'
+        )
+    axes.set_title(text, fontsize=11)
+    save(figure, path)
+
+
+def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:
+    """Growth rate as colour, white where a vibration neither grows nor decays."""
+    from matplotlib.colors import TwoSlopeNorm
+
+    low, high = float(growth.growth_rate.min()), float(growth.growth_rate.max())
+    # Grey to orange by way of white: the lines over it keep their colours.
+    colours = axes.pcolormesh(
+        growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
+        cmap='PuOr_r', norm=TwoSlopeNorm(0.0, min(low, -1.0), max(high, 1.0)),
+        shading='nearest', rasterized=True, alpha=0.85,
+    )  # fmt: skip
+    axes.figure.colorbar(colours, ax=axes, label='growth rate / s$^{-1}$', pad=0.01)
+    if zero:
+        axes.contour(
+            growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
+            levels=[0.0], colors='k', linewidths=2.2,
+        )  # fmt: skip
+
+
+def draw_limits(
+    axes: Axes,
+    limits: SafeLimit,
+    contact: BearingContact,
+    depth_limit: float,
+    *,
+    shade: bool = True,
+) -> None:
+    """Draw limits and safe region over speed, rev/min, and depth, mm.
+
+    Args:
+        axes: To draw into.
+        limits: Over rising speeds.
+        contact: Of the cut.
+        depth_limit: Top of the chart, m.
+        shade: Whether to shade the safe region.
+    """
+    speeds, top = limits.spindle_speed_rpm, depth_limit * _MILLI
+
+    def shown(depth: Array) -> Array:
+        result: Array = np.minimum(depth * _MILLI, 10.0 * top)
+        return result
+
+    if shade:
+        axes.fill_between(
+            speeds,
+            0.0,
+            shown(limits.depth_of_cut),
+            color=SAFE,
+            alpha=0.16,
+            lw=0,
+            label='small disturbances die out',
+        )  # fmt: skip
+    if contact is not BearingContact.SEATED:
+        axes.plot(speeds, shown(limits.open_limit), color=OPEN, lw=1.3, label='limit, open')
+    if contact is not BearingContact.NONE:
+        axes.plot(
+            speeds, shown(limits.seated_limit), color=SEATED, lw=1.3, ls='--',
+            label='limit, on its bearing',
+        )  # fmt: skip
+    if contact is BearingContact.GAP and np.isfinite(limits.seating_line).any():
+        axes.plot(
+            speeds, shown(limits.seating_line), color=LINE, lw=1.1, ls=':', label='seating line'
+        )
+    axes.set_xlim(speeds[0], speeds[-1])
+    axes.set_ylim(0.0, top)
+    axes.set_xlabel('spindle speed / (rev/min)')
+    axes.set_ylabel('depth of cut / mm')
+    grid(axes)

@@ -1,0 +1,99 @@
+"""What every picture has in common: colours, units with their prefixes, files.
+
+Okabe and Ito's palette is told apart with any colour vision, and the same thing has the same
+colour in every picture.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TOOL, WORKPIECE, ALARM, NEUTRAL = '#0072B2', '#D55E00', '#CC79A7', '#555555'
+ALARM_TEXT = '#8a3c66'
+"""The same, dark enough to be read."""
+KNOCK = '#8A6D00'
+OPEN, SEATED, LINE, SAFE = '#0072B2', '#D55E00', '#000000', '#009E73'
+_PREFIXES = {-4: 'p', -3: 'n', -2: 'µ', -1: 'm', 0: '', 1: 'k', 2: 'M', 3: 'G', 4: 'T'}
+_BINS = 1500
+_DPI = 110
+
+
+class Scale(NamedTuple):
+    """How to show a quantity: a factor to multiply by, and the unit that it is then in."""
+
+    factor: float
+    unit: str
+
+    def label(self, name: str) -> str:
+        """A label of an axis, name / unit."""
+        return f'{name} / {self.unit}' if '/' not in self.unit else f'{name} / ({self.unit})'
+
+
+def scale_for(unit: str, *values: Any) -> Scale:
+    """The SI prefix with which the largest of some values has one to three digits.
+
+    Args:
+        unit: Without prefix: m, m/s, N.
+        values: Arrays or numbers in that unit.
+    """
+    largest = max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
+    if not math.isfinite(largest) or largest == 0.0:
+        return Scale(1.0, unit)
+    # Just below a power of a thousand the larger prefix would give 0.999.
+    power = math.floor(math.log10(largest) / 3.0 + 1e-9)
+    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    return Scale(1000.0**-power, f'{_PREFIXES[power]}{unit}')
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, inches.
+
+    Not pyplot's: that would choose a backend and keep every figure in a global list.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout='constrained')
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG and, beside it, as SVG with its text as text."""
+    from matplotlib import rc_context
+
+    # The layout serves both files: to work it out takes as long as to draw one.
+    figure.draw_without_rendering()
+    figure.set_layout_engine('none')
+    # Neither file tells when or with what it was made: the same picture is the same bytes.
+    with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': path.stem}):
+        figure.savefig(path.with_suffix('.png'), dpi=_DPI, metadata={'Software': None})
+        figure.savefig(path.with_suffix('.svg'), metadata={'Date': None, 'Creator': None})
+
+
+def envelope(axes: Axes, time: Array, value: Array, colour: str, label: str = '') -> None:
+    """A long signal as the band between its smallest and largest values, never as 10^6 points.
+
+    A short one is drawn as it is.
+    """
+    if len(value) <= 2 * _BINS:
+        axes.plot(time, value, color=colour, lw=0.8, label=label)
+        return
+    edges = np.linspace(0, len(value), _BINS + 1).astype(int)[:-1]
+    low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
+    axes.fill_between(time[edges], low, high, color=colour, lw=0.4, label=label)
+
+
+def grid(axes: Axes) -> None:
+    """A faint grid."""
+    axes.grid(visible=True, alpha=0.25)

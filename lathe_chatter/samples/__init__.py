@@ -1,0 +1,7 @@
+"""What a block of samples is: its columns, its bytes in a message, and what follows on what."""
+
+from __future__ import annotations
+
+from lathe_chatter.samples.columns import SAMPLE_COLUMNS, STATE_FIELDS
+
+__all__ = ['SAMPLE_COLUMNS', 'STATE_FIELDS']

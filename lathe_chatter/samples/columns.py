@@ -1,0 +1,12 @@
+"""The columns of a block of samples."""
+
+from __future__ import annotations
+
+STATE_FIELDS = (
+    'tool_displacement',
+    'tool_velocity',
+    'workpiece_displacement',
+    'workpiece_velocity',
+)
+SAMPLE_COLUMNS = ('time', 'spindle_angle', *STATE_FIELDS, 'chip_thickness', 'cutting_force')
+"""The columns of a block of samples: s, rev, m, m/s, m, m/s, m, N."""

@@ -1,0 +1,244 @@
+"""A scenario: the parameters of a lathe at its start and the changes that an operator makes.
+
+A scenario is a YAML file; config/scenarios/ holds two with every key explained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from lathe_chatter.errors import LatheChatterError, ParameterError, reason_of
+from lathe_chatter.model import Cut
+from lathe_chatter.model.quantities import Quantity
+
+RECOMMENDED = 'recommended'
+"""Stands for the speed that the monitor recommends."""
+FLAGGED, CLEARED = 'flagged', 'cleared'
+_TIME = Quantity('a time', 's', high=86400.0)
+
+
+class ScenarioError(LatheChatterError):
+    """A scenario file that cannot be played; the text says what is wrong where."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One change of parameters.
+
+    Attributes:
+        changes: Parameter names of the node `lathe` with their new values, or `RECOMMENDED`.
+        at: Simulated time of the change, s; None where it waits for the monitor.
+        when: `FLAGGED` or `CLEARED`: what the monitor must have said since the step before.
+        after: s of simulated time to let pass after that.
+        because: Why, for the reader of the run.
+    """
+
+    changes: Mapping[str, Any]
+    at: float | None = None
+    when: str | None = None
+    after: float = 0.0
+    because: str = ''
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What a run does.
+
+    Attributes:
+        name: Short, for file names.
+        title: One line for people.
+        duration: Simulated time after which the run ends, s.
+        parameters: Of the node `lathe` at its start.
+        steps: The changes, in order.
+        expect: What the monitor should have said at the end: `FLAGGED` and `CLEARED` to a truth.
+    """
+
+    name: str
+    title: str
+    duration: float
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    steps: tuple[Step, ...] = ()
+    expect: Mapping[str, bool] = field(default_factory=dict)
+
+    @property
+    def parameter_names(self) -> list[str]:
+        """Every parameter that the scenario names, at the start or in a step."""
+        return [*self.parameters, *(name for step in self.steps for name in step.changes)]
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """The scenario files of the package by name."""
+    return {file.stem: file for file in sorted(_shipped_folder().glob('*.yaml'))}
+
+
+def _shipped_folder() -> Path:
+    """config/scenarios of the installed package, or of the source tree."""
+    package = Path(__file__).resolve().parents[1]
+    places = [
+        package.parent / 'config' / 'scenarios',
+        *(
+            parent / 'share' / 'lathe_chatter' / 'config' / 'scenarios'
+            for parent in package.parents
+        ),
+    ]
+    return next((place for place in places if place.is_dir()), places[0])
+
+
+def find_scenario(name_or_path: str) -> Path:
+    """The file of a scenario named as it is shipped or by its path.
+
+    Raises:
+        ScenarioError: If there is none.
+    """
+    shipped = shipped_scenarios()
+    if name_or_path in shipped:
+        return shipped[name_or_path]
+    path = Path(name_or_path)
+    if not path.is_file():
+        raise ScenarioError(
+            f'There is no scenario {name_or_path!r}: give the path of a YAML file or one of '
+            f'{", ".join(shipped) or "none that is installed"}.'
+        )
+    return path
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read and check a scenario file.
+
+    Changes are checked here, parameters of the start by the lathe that gets them.
+
+    Raises:
+        ScenarioError: If the file is no scenario.
+    """
+    try:
+        raw = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise ScenarioError(f'The scenario {path} cannot be read: {reason_of(error)}.') from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else 'its YAML'
+        raise ScenarioError(
+            f'The scenario {path} cannot be read: at {where}, {error.problem}.'
+        ) from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = ' '.join(str(error).split())
+        raise ScenarioError(f'The scenario {path} cannot be read: {reason}.') from None
+    if not isinstance(raw, dict):
+        raise ScenarioError(f'The scenario {path} is empty or no mapping of keys to values.')
+    where = f'The scenario {path}'
+    _only(raw, {'name', 'title', 'duration', 'parameters', 'steps', 'expect'}, where)
+    steps = raw.get('steps') or []
+    if not isinstance(steps, list):
+        raise ScenarioError(f'{where}: steps must be a list.')
+    expect = _mapping(raw, 'expect', where)
+    _only(expect, {FLAGGED, CLEARED}, f'{where}: expect')
+    wrong = next((key for key, value in expect.items() if not isinstance(value, bool)), None)
+    if wrong is not None:
+        raise ScenarioError(f'{where}: expect.{wrong} must be true or false.')
+    name = str(raw.get('name', path.stem))
+    duration = _time(raw, 'duration', where, required=True)
+    if not duration:
+        raise ScenarioError(f'{where}: duration is 0 s: it must be more.')
+    scenario = Scenario(
+        name=name,
+        title=str(raw.get('title', name)),
+        duration=duration,
+        parameters=_mapping(raw, 'parameters', where),
+        steps=tuple(_step(entry, f'{where}: step {k + 1}') for k, entry in enumerate(steps)),
+        expect=expect,
+    )
+    _check_times(scenario, where)
+    return scenario
+
+
+def _check_times(scenario: Scenario, where: str) -> None:
+    """Refuse a step whose time comes before that of the one before it, or never."""
+    before = 0.0
+    for number, step in enumerate(scenario.steps, 1):
+        if step.at is None:
+            continue
+        if step.at < before:
+            raise ScenarioError(
+                f'{where}: step {number} is at {step.at:g} s, and one before it at {before:g} s: '
+                'steps must be in order of time.'
+            )
+        if step.at > scenario.duration:
+            raise ScenarioError(
+                f'{where}: step {number} is at {step.at:g} s, and the run ends at '
+                f'{scenario.duration:g} s.'
+            )
+        before = step.at
+
+
+def _step(entry: Any, where: str) -> Step:
+    """One entry of the list of steps."""
+    if not isinstance(entry, dict):
+        raise ScenarioError(f'{where} must be a mapping with at or when, and set.')
+    _only(entry, {'at', 'when', 'after', 'set', 'because'}, where)
+    if ('at' in entry) == ('when' in entry):
+        raise ScenarioError(f'{where} must have either at (a time in s) or when.')
+    when = entry.get('when')
+    if 'when' in entry and when not in {FLAGGED, CLEARED}:
+        raise ScenarioError(f'{where}: when is {when!r}: it must be {FLAGGED} or {CLEARED}.')
+    changes = _mapping(entry, 'set', where)
+    if not changes:
+        raise ScenarioError(f'{where}: set must name at least one parameter.')
+    for name, value in changes.items():
+        _check_change(name, value, where)
+    return Step(
+        changes=changes,
+        at=_time(entry, 'at', where),
+        when=when,
+        after=_time(entry, 'after', where) or 0.0,
+        because=str(entry.get('because', '')),
+    )
+
+
+def _check_change(name: str, value: Any, where: str) -> None:
+    """Refuse what the lathe would refuse when its time comes."""
+    if name == 'real_time_factor' or (name, value) == ('spindle_speed_rpm', RECOMMENDED):
+        return  # known to the node alone, and to the monitor
+    if name not in Cut.__dataclass_fields__:
+        known = ', '.join(Cut.__dataclass_fields__)
+        near = get_close_matches(name, Cut.__dataclass_fields__, n=1)
+        hint = f'did you mean {near[0]}?' if near else f'what can change is {known}.'
+        raise ScenarioError(f'{where}: {name!r} cannot change while the lathe cuts: {hint}')
+    try:
+        Cut(**{name: value})
+    except ParameterError as error:
+        raise ScenarioError(f'{where}: {error}') from None
+
+
+def _only(raw: Mapping[str, Any], known: set[str], where: str) -> None:
+    """Refuse a key that would otherwise be ignored in silence."""
+    unknown = next((key for key in raw if key not in known), None)
+    if unknown is not None:
+        raise ScenarioError(
+            f'{where} has no key {unknown!r}: known are {", ".join(sorted(known))}.'
+        )
+
+
+def _mapping(raw: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
+    """The mapping under `key`, empty where it is missing."""
+    value = raw.get(key) or {}
+    if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
+        raise ScenarioError(f'{where}: {key} must be a mapping of names to values.')
+    return value
+
+
+def _time(raw: Mapping[str, Any], key: str, where: str, *, required: bool = False) -> float | None:
+    """The time under `key` in s."""
+    if key not in raw:
+        if required:
+            raise ScenarioError(f'{where} needs {key}, in s of simulated time.')
+        return None
+    try:
+        return _TIME.check(key, raw[key])
+    except ValueError as error:
+        raise ScenarioError(f'{where}: {error}') from None

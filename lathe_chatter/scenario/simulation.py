@@ -1,0 +1,228 @@
+"""A scenario played without ROS, as fast as the machine allows, into a run like any other.
+
+Lathe, monitor and record are those of the nodes; only the operator is a loop. Blocks end where
+a step is due, so a change that has a time takes effect at the sample that it names.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.config import start_from
+from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, knock_sentence
+from lathe_chatter.recording import LatheRun
+from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.scenario import CLEARED, FLAGGED, RECOMMENDED, Scenario, Step
+
+_BLOCK, _WATCHED_BLOCK = 0.05, 0.01
+"""s of samples in one message, without a monitor and with one."""
+_REPORT_PERIOD = 0.02
+_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
+_MONITOR = '/chatter_monitor'
+_OF_NODES = {'real_time_factor', 'publish_clock', 'tick_rate', 'record'}
+"""Parameters of the node `lathe` that mean nothing here."""
+
+Tell = Callable[[float, str], None]
+"""Takes simulated time, s, and what happened then."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What came of a simulation.
+
+    Attributes:
+        folder: Of the run.
+        samples: That it has.
+        time: Simulated, s.
+        flagged: Whether the monitor flagged chatter; None without a monitor.
+        cleared: Whether its flag was down in the end after it had been up.
+        guard: Why the lathe ended before the scenario did, as a sentence, or empty.
+    """
+
+    folder: Path
+    samples: int
+    time: float
+    flagged: bool | None
+    cleared: bool | None
+    guard: str
+
+
+def needs_monitor(scenario: Scenario) -> bool:
+    """Whether a step waits for the monitor, or something is expected of it."""
+    return bool(scenario.expect) or any(step.when is not None for step in scenario.steps)
+
+
+def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who is told
+    scenario: Scenario,
+    folder: Path,
+    *,
+    knocks: Sequence[Knock] = (),
+    monitor: bool = True,
+    progress: Callable[[float], None] = lambda _time: None,
+    tell: Tell = lambda _time, _what: None,
+) -> Simulated:
+    """Play a scenario on a lathe and record it.
+
+    Args:
+        scenario: Parameters, steps, duration.
+        folder: Of the run, to make.
+        knocks: On the tool.
+        monitor: Whether a detector watches; steps that wait for it never come without.
+        progress: Is told the simulated time now and then, s.
+        tell: Is told what happens.
+
+    Raises:
+        ParameterError: If a parameter is unknown or not allowed.
+        RunExistsError: If the folder exists.
+        OSError: If it cannot be written.
+    """
+    given = {n: v for n, v in scenario.parameters.items() if n not in _OF_NODES}
+    start = start_from(given)
+    lathe = start.lathe()
+    with LatheRun(folder, start.parameters(), simulated=True) as run:
+        run.tell(BEGINNING)
+        player = _Player(lathe, run, scenario, knocks, tell)
+        if monitor:
+            player.watch(ChatterDetector(start.machine))
+        while player.play_block():
+            progress(lathe.time)
+    return Simulated(
+        folder,
+        lathe.samples_taken,
+        lathe.time,
+        FLAGGED in player.said if monitor else None,
+        player.said[-1:] == [CLEARED] if monitor else None,
+        lathe.guard,
+    )
+
+
+class _Player:
+    """One scenario on one lathe."""
+
+    def __init__(
+        self,
+        lathe: VirtualLathe,
+        run: LatheRun,
+        scenario: Scenario,
+        knocks: Sequence[Knock],
+        tell: Tell,
+    ) -> None:
+        self.said: list[str] = []
+        self._lathe, self._run, self._tell = lathe, run, tell
+        self._end = round(scenario.duration * lathe.sample_rate)
+        self._steps = list(scenario.steps)
+        self._knocks = sorted(knocks, key=lambda knock: knock.time)
+        self._heard_before_step, self._heard_at = 0, 0.0
+        self._detector: ChatterDetector | None = None
+        self._estimate = Estimate()
+        self._next_report = 0.0
+        self._flag, self._state = False, ''
+
+    def watch(self, detector: ChatterDetector) -> None:
+        """Have a detector look at every block from now on."""
+        self._detector = detector
+        self._run.publish(f'{_MONITOR}/chatter', 'std_msgs/msg/Bool', data=False)
+
+    def play_block(self) -> bool:
+        """Do what is due and cut on for a block; whether there is more to do."""
+        now = self._lathe.samples_taken
+        while self._steps and self._is_due(self._steps[0]):
+            self._play(self._steps.pop(0))
+        while self._knocks and self._sample_of(self._knocks[0].time) <= now:
+            self._knock(self._knocks.pop(0).impulse)
+        if now >= self._end:
+            return False
+        samples = self._lathe.advance(self._next_stop() - now)
+        if len(samples):
+            self._run.take(samples)
+            if self._detector is not None:
+                self._hear(self._detector.update(samples, SAMPLE_COLUMNS))
+        return not self._lathe.guard
+
+    def _sample_of(self, time: float) -> int:
+        """The sample after which something happens that is to happen at a time, s."""
+        return round(time * self._lathe.sample_rate)
+
+    def _next_stop(self) -> int:
+        """The sample at which the block ends: at once a block's length or the next event."""
+        length = _BLOCK if self._detector is None else _WATCHED_BLOCK
+        now = self._lathe.samples_taken
+        stops = [self._end, now + max(round(length * self._lathe.sample_rate), 1)]
+        stops += [self._sample_of(knock.time) for knock in self._knocks[:1]]
+        if self._steps and self._steps[0].at is not None:
+            stops.append(self._sample_of(self._steps[0].at))
+        return max(min(stops), now + 1)
+
+    # -- acting ----------------------------------------------------------------------------
+
+    def _is_due(self, step: Step) -> bool:
+        """Whether a step's time has come, or what it waits for has been said long enough."""
+        if step.at is not None:
+            return self._lathe.samples_taken >= self._sample_of(step.at)
+        if step.when not in self.said[self._heard_before_step :]:
+            return False
+        wanted = RECOMMENDED in step.changes.values()
+        if wanted and not math.isfinite(self._estimate.recommended_speed_rpm):
+            return False
+        return self._lathe.time >= self._heard_at + step.after
+
+    def _play(self, step: Step) -> None:
+        changes = {
+            name: self._resolved(value)
+            for name, value in step.changes.items()
+            if name not in _OF_NODES
+        }
+        cut = self._lathe.cut.with_changes(**changes)
+        sentence = change_sentence(self._lathe.time, self._lathe.cut, cut)
+        self._lathe.retune(cut)
+        if sentence:
+            self._run.tell(sentence)
+        shown = ', '.join(f'{name} = {value}' for name, value in changes.items())
+        self._tell(self._lathe.time, f'{shown}{step.because and f"  ({step.because})"}')
+        self._heard_before_step = len(self.said)
+
+    def _resolved(self, value: Any) -> Any:
+        """The speed that the monitor recommends, rounded to what a machinist would set."""
+        if value == RECOMMENDED:
+            return float(round(self._estimate.recommended_speed_rpm))
+        return value
+
+    def _knock(self, impulse: float) -> None:
+        self._run.tell(knock_sentence(self._lathe.time, impulse))
+        self._lathe.knock(impulse)
+        self._tell(self._lathe.time, f'knock of {impulse:g} N s')
+
+    # -- listening -------------------------------------------------------------------------
+
+    def _hear(self, estimate: Estimate) -> None:
+        """Record what the detector says, the figures before the flag that they explain."""
+        self._estimate = estimate
+        changed = estimate.state != self._state or estimate.chatter != self._flag
+        if changed or estimate.time >= self._next_report:
+            self._next_report = estimate.time + _REPORT_PERIOD
+            for name in _FIGURES:
+                value = float(getattr(estimate, name))
+                if math.isfinite(value):
+                    self._run.publish(f'{_MONITOR}/{name}', 'std_msgs/msg/Float64', data=value)
+        if estimate.state != self._state:
+            self._state = estimate.state
+            self._run.publish(f'{_MONITOR}/state', 'std_msgs/msg/String', data=self._state)
+        if estimate.chatter == self._flag:
+            return
+        self._flag = estimate.chatter
+        self._run.publish(f'{_MONITOR}/chatter', 'std_msgs/msg/Bool', data=self._flag)
+        self.said.append(FLAGGED if self._flag else CLEARED)
+        self._heard_at = self._lathe.time
+        what = 'flag cleared: the cut is stable'
+        if self._flag:
+            what = (
+                f'chatter flagged: {estimate.frequency:.1f} Hz, '
+                f'growth {estimate.growth_rate:+.1f} 1/s'
+            )
+        self._tell(self._lathe.time, what)

@@ -1,0 +1,100 @@
+"""`lobes`, `knock-map` and `bench` as a user calls them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from lathe_chatter.cli import main as cli
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.stability import safe_limit
+
+
+def test_lobes_tells_the_limits_as_csv_and_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture, table = tmp_path / 'chart.png', tmp_path / 'chart.csv'
+    arguments = ['--output', str(picture), '--csv', str(table), '--bearing-clearance', '1e-5']
+    assert cli.main(['lobes', *arguments, '--from', '2500', '--to', '3500', '--json']) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures['parameters']['bearing_clearance'] == 1e-5
+    with table.open(newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row['safe_depth']) for row in rows] == figures['safe_depth']
+    speeds = figures['spindle_speed_rpm']
+    expected = safe_limit(Machine(), Cut(bearing_clearance=1e-5), speeds)
+    assert figures['safe_depth'] == expected.depth_of_cut.tolist()
+    assert figures['seating_line'] == expected.seating_line.tolist()
+    assert picture.read_bytes().startswith(b'\x89PNG')
+    assert picture.with_suffix('.svg').is_file()
+
+
+def test_a_machine_without_a_limit_has_a_chart_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A material that needs no force: every limit is infinite, and null in JSON."""
+    arguments = ['--cutting-coefficient', '0', '--bearing-contact', 'none', '--json']
+    assert cli.main(['lobes', '--output', str(tmp_path / 'a.png'), *arguments]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert set(figures['open_limit']) == {None}
+    assert 'seated_limit' not in figures
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['lobes', '--from', '1'], '--from is 1.0 rev/min: it must be'),
+        (['lobes', '--from', '4000', '--to', '3000'], 'above --from'),
+        (['lobes', '--depth-of-cut', 'deep'], "depth_of_cut is 'deep' m"),
+        (['lobes', '--tool.mass', '0'], 'tool.mass is 0.0 kg'),
+        (['lobes', '--output', '/dev/null/all.png'], 'cannot be'),
+        (['knock-map', '--speeds', '3000:2000:5'], 'A:B:N with A below B'),
+        (['knock-map', '--speeds', 'fast'], '--speeds is'),
+        (['knock-map', '--depths', '1'], '--depths is 1.0 m'),
+        (['knock-map', '--depths', '0.0001:0.001:x'], 'A:B:N'),
+        (['bench', 'luck'], "TOPIC is 'luck'"),
+        (['bench', '--repeats', '0'], '--repeats is 0'),
+    ],
+)
+def test_a_mistake_is_one_sentence(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(arguments) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert told.count('\n') == 1
+
+
+def test_knock_map_draws_tells_and_continues(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    points = tmp_path / 'points.jsonl'
+    call = [
+        'knock-map', '--clearances', '8e-6:12e-6:2', '--depths', '0.00065', '--reach', '3',
+        '--step', '1.5', '--output', str(points), '--json',
+    ]  # fmt: skip
+    assert cli.main(call) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert [point['margin'] for point in first] == ['finite', 'none found']
+    assert first[0]['survived'] < abs(first[0]['impulse'])
+    assert first[1]['impulse'] is None
+    written = points.read_bytes()
+    assert points.with_suffix('.png').read_bytes().startswith(b'\x89PNG')
+    assert cli.main(call) == 0
+    assert json.loads(capsys.readouterr().out) == first
+    assert points.read_bytes() == written
+    assert cli.main([*call[:-1], '--tolerance', '0.2']) == 2
+    assert 'holds another map' in capsys.readouterr().err
+
+
+def test_bench_prints_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(['bench', 'lathe', '--repeats', '1', '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told['machine']
+    values = [figure['value'] for figure in told['figures']['lathe']]
+    assert values
+    assert all(value > 0.0 and math.isfinite(value) for value in values)

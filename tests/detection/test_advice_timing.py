@@ -1,0 +1,72 @@
+"""Which estimate a recommended speed comes from; whether it is stable, its root tells."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from support.machines import random_machine
+
+from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.stability import critical_depth, rightmost_root
+
+_RANGE = (1000.0, 12000.0)
+_OPEN = {'bearing_contact': 'none', 'force_noise': 4.5e-4, 'sensor_noise': 1e-7}
+
+
+def _watch(detector: ChatterDetector, lathe: VirtualLathe, duration: float) -> list[Estimate]:
+    blocks = round(duration * lathe.sample_rate / 100)
+    return [detector.update(lathe.advance(100), SAMPLE_COLUMNS) for _ in range(blocks)]
+
+
+def _growth(machine: Machine, rpm: float, depth: float) -> float:
+    return rightmost_root(machine, rpm, depth, seated=False).real
+
+
+@pytest.mark.parametrize('seed', [4, 5, 6, 8, 9])
+def test_a_speed_comes_from_the_cut_before_the_tool_left_it(seed: int) -> None:
+    machine = random_machine(np.random.default_rng(seed))
+    rpm = 5000.0
+    limit = critical_depth(machine, rpm, seated=False)
+    quiet, deep = 0.5 * limit, 1.6 * limit
+    cut = Cut(spindle_speed_rpm=rpm, depth_of_cut=quiet, **_OPEN)
+    lathe = VirtualLathe(machine, cut, seed=seed)
+    detector = ChatterDetector(machine, speed_range=_RANGE)
+    assert not any(estimate.chatter for estimate in _watch(detector, lathe, 1.5))
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=deep))
+    last = _watch(detector, lathe, 2.0)[-1]
+    # The tool leaves the cut by now, and what is told of the cut is that of one less deep ...
+    assert last.cutting_stiffness < 0.9 * machine.cutting_coefficient * deep
+    # ... but the recommended speed suits the depth that there is.
+    assert math.isfinite(last.recommended_speed_rpm)
+    assert _growth(machine, last.recommended_speed_rpm, deep) < 0.0
+
+
+def test_after_a_speed_that_was_no_cure_another_is_recommended() -> None:
+    depth, worse = 1.1e-3, 4300.0
+    assert _growth(Machine(), worse, depth) > 0.0
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=depth, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    before = _watch(detector, lathe, 1.5)[-1]
+    lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=worse))
+    after = _watch(detector, lathe, 1.5)[-1]
+    assert after.chatter
+    assert after.recommended_speed_rpm != before.recommended_speed_rpm
+    assert _growth(Machine(), after.recommended_speed_rpm, depth) < 0.0
+
+
+def test_nothing_is_recommended_while_the_chatter_dies_down() -> None:
+    depth = 1.1e-3
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=depth, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    cure = _watch(detector, lathe, 1.5)[-1].recommended_speed_rpm
+    assert _growth(Machine(), cure, depth) < 0.0
+    lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=cure))
+    seen = _watch(detector, lathe, 2.0)
+    assert not seen[-1].chatter
+    dying = [estimate for estimate in seen if estimate.chatter][40:]
+    assert not any(estimate.advice.speeds for estimate in dying)

@@ -1,0 +1,91 @@
+"""The surface of the last turn: quintics over spindle angle, rebased once a turn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.lathe.integrator import surface
+
+_QUINTIC = Polynomial([0.3, -1.0, 2.0, 0.7, -1.3, 0.4])
+
+
+def _nodes(angles: list[float]) -> Array:
+    nodes = np.zeros((len(angles) + 3, surface.NODE_SIZE))
+    slope, curvature = _QUINTIC.deriv(), _QUINTIC.deriv(2)
+    for k, angle in enumerate(angles):
+        nodes[k, surface.ANGLE] = angle
+        nodes[k, surface.HEIGHT] = _QUINTIC(angle)
+        nodes[k, [surface.SLOPE_BEFORE, surface.SLOPE_AFTER]] = slope(angle)
+        nodes[k, [surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER]] = curvature(angle)
+        nodes[k, surface.ORDER] = surface.SMOOTH
+    return nodes
+
+
+@pytest.mark.parametrize('angle', [0.1, 0.13, 0.37, 0.4])
+def test_a_quintic_is_held_exactly(angle: float) -> None:
+    height, slope, curvature = surface.surface_at(_nodes([-0.2, 0.1, 0.4]), 1, angle)
+    assert height == pytest.approx(_QUINTIC(angle), rel=1e-14)
+    assert slope == pytest.approx(_QUINTIC.deriv()(angle), rel=1e-13)
+    assert curvature == pytest.approx(_QUINTIC.deriv(2)(angle), rel=1e-12)
+
+
+def test_a_corner_has_two_sides() -> None:
+    nodes = _nodes([-0.2, 0.1, 0.4])
+    nodes[1, surface.SLOPE_AFTER] += 5.0
+    nodes[1, surface.CURVATURE_AFTER] -= 3.0
+    before = surface.surface_at(nodes, 0, 0.1)
+    after = surface.surface_at(nodes, 1, 0.1)
+    assert after[0] == pytest.approx(before[0], rel=1e-14)
+    assert after[1] - before[1] == pytest.approx(5.0, rel=1e-12)
+    assert after[2] - before[2] == pytest.approx(-3.0, rel=1e-12)
+
+
+def test_the_error_of_the_hold_falls_with_the_sixth_power_of_the_step() -> None:
+    errors = []
+    for width in (0.2, 0.1):
+        nodes = np.zeros((2, surface.NODE_SIZE))
+        for k, angle in enumerate((0.5, 0.5 + width)):
+            nodes[k, surface.ANGLE], nodes[k, surface.HEIGHT] = angle, np.sin(7.0 * angle)
+            nodes[k, [surface.SLOPE_BEFORE, surface.SLOPE_AFTER]] = 7.0 * np.cos(7.0 * angle)
+            nodes[k, [surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER]] = -49.0 * np.sin(
+                7.0 * angle
+            )
+        places = 0.5 + width * np.linspace(0.0, 1.0, 101)
+        held = np.array([surface.surface_at(nodes, 0, place)[0] for place in places])
+        errors.append(np.abs(held - np.sin(7.0 * places)).max())
+    assert errors[0] > 2.0**5.5 * errors[1]
+
+
+def test_before_the_first_turn_the_surface_is_a_ramp() -> None:
+    nodes = surface.fresh_surface(50e-6, 16)
+    assert nodes.shape == (16, surface.NODE_SIZE)
+    for angle in (-1.0, -0.3, 0.0):
+        height, slope, curvature = surface.surface_at(nodes, 0, angle)
+        assert height == pytest.approx(50e-6 * angle, abs=1e-20)
+        assert slope == pytest.approx(50e-6)
+        assert curvature == pytest.approx(0.0, abs=1e-18)
+
+
+def test_a_new_turn_moves_the_origin_and_nothing_else() -> None:
+    nodes = _nodes([-0.2, 0.1, 0.4, 0.9])
+    before = [surface.surface_at(nodes, left, 0.05 + 0.3 * left) for left in (1, 2)]
+    surface.next_turn(nodes, 1, 3, 0.25)
+    after = [surface.surface_at(nodes, left - 1, 0.05 + 0.3 * left - 1.0) for left in (1, 2)]
+    for old, new in zip(before, after, strict=True):
+        assert new[0] + 0.25 == pytest.approx(old[0], rel=1e-12)
+        assert new[1:] == pytest.approx(old[1:], rel=1e-9)
+
+
+def test_room_for_more_nodes_keeps_every_bit() -> None:
+    nodes = _nodes([-0.2, 0.1, 0.4])
+    more = surface.with_room(nodes, 100)
+    assert more.shape == (100, surface.NODE_SIZE)
+    assert np.array_equal(more[: len(nodes)], nodes)
+    assert not more[len(nodes) :].any()
+
+
+def test_a_node_lies_in_one_line_of_the_cache() -> None:
+    assert all(surface.empty_nodes(3, n).ctypes.data % 64 == 0 for n in range(1, 20))

@@ -1,0 +1,47 @@
+"""Parameters by name, there and back."""
+
+from __future__ import annotations
+
+import pytest
+
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.lathe.config import Start, parameter_names, start_from
+from lathe_chatter.model import BearingContact
+
+
+def test_parameters_come_back_as_they_were() -> None:
+    given = {
+        'depth_of_cut': 0.001,
+        'bearing_contact': 'none',
+        'tool.mass': 0.06,
+        'cutting_coefficient': 2e6,
+        'tool_leaves_cut': False,
+        'seed': 7,
+        'sample_rate': 2e4,
+    }
+    start = start_from(given)
+    assert start.cut.bearing_contact is BearingContact.NONE
+    assert start.machine.tool.mass == 0.06
+    assert {name: start.parameters()[name] for name in given} == given
+    assert start_from(start.parameters()) == start
+    assert set(Start().parameters()) == {name for name, _ in parameter_names()}
+
+
+def test_the_lathe_is_the_one_described() -> None:
+    lathe = start_from({'spindle_speed_rpm': 4000.0, 'sample_rate': 5e3, 'seed': 3}).lathe()
+    assert (lathe.cut.spindle_speed_rpm, lathe.sample_rate, lathe.setup.seed) == (4000.0, 5e3, 3)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'depth_of_cutt': 1e-3}, 'perhaps depth_of_cut'),
+        ({'tool.mass': -1.0}, 'tool.mass is -1.0 kg'),
+        ({'tool_leaves_cut': 'yes'}, 'tool_leaves_cut'),
+        ({'seed': 1.5}, 'seed'),
+        ({'bearing_contact': 'loose'}, 'none, gap, seated'),
+    ],
+)
+def test_what_is_wrong_is_named(values: dict[str, object], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        start_from(values)

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from lathe_chatter.nodes.deferred_signals import HeldSignals
+
+
+@pytest.fixture(autouse=True)
+def handlers() -> Iterator[list[int]]:
+    """SIGTERM and SIGHUP raise KeyboardInterrupt, as in the program, and are listed."""
+    came: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    for number in before:
+        signal.signal(number, interrupt)
+    yield came
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_waits_until_it_is_heeded(number: signal.Signals) -> None:
+    with HeldSignals() as held:
+        held.heed()
+        os.kill(os.getpid(), number)
+        with pytest.raises(KeyboardInterrupt):
+            held.heed()
+        held.heed()  # once
+
+
+def test_the_first_of_several_signals_counts(handlers: list[int]) -> None:
+    with HeldSignals() as held:
+        for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGTERM):
+            os.kill(os.getpid(), number)
+        with pytest.raises(KeyboardInterrupt):
+            held.heed()
+    assert handlers == [signal.SIGTERM]
+
+
+def test_what_nobody_heeded_comes_at_the_end(handlers: list[int]) -> None:
+    with pytest.raises(KeyboardInterrupt), HeldSignals():
+        os.kill(os.getpid(), signal.SIGHUP)
+    assert handlers == [signal.SIGHUP]
+    with pytest.raises(KeyboardInterrupt):  # and the handler is back
+        os.kill(os.getpid(), signal.SIGHUP)
+
+
+def test_an_error_goes_before_a_signal() -> None:
+    def fail_when_told_to_end() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        raise ValueError('the real reason')
+
+    with pytest.raises(ValueError, match='real'), HeldSignals():
+        fail_when_told_to_end()
+
+
+def test_a_signal_that_is_ignored_stays_ignored() -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with HeldSignals() as held:
+        os.kill(os.getpid(), signal.SIGHUP)
+        held.heed()
+    assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN

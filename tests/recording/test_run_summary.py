@@ -1,0 +1,113 @@
+"""The summary at the end of a run, against what was put in."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.cut_events import BEGINNING, change_sentence
+from lathe_chatter.lathe.parameters import parameters_of
+from lathe_chatter.model import Cut
+from lathe_chatter.recording import LatheRun, read_run
+from lathe_chatter.recording.cut_session import Journal
+from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, samples_bytes
+from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.samples.codec import SAMPLES_TYPE
+
+TICK = 2_000_000
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    (values,) = [note.values for note in read_run(folder).notes() if note.name == SUMMARY]
+    return {name: json.loads(value) for name, value in values.items()}
+
+
+def test_counts_samples_flags_and_the_linear_models_verdict_are_in_the_run(tmp_path: Path) -> None:
+    lathe = VirtualLathe()
+    with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
+        run.tell(BEGINNING)
+        for k in range(50):
+            if k == 20:
+                run.publish('/chatter_monitor/chatter', 'std_msgs/msg/Bool', data=True)
+                deeper = lathe.cut.with_changes(depth_of_cut=0.001)
+                run.tell(change_sentence(lathe.time, lathe.cut, deeper))
+                lathe.retune(deeper)
+            run.take(lathe.advance(20))
+    told = summary_of(tmp_path / 'run')
+    assert told['messages'] == {
+        '/chatter_monitor/chatter': 1, '/lathe/samples': 50, '/parameter_events': 1, '/rosout': 2,
+    }  # fmt: skip
+    samples = told['samples']['/lathe/samples']
+    assert (samples['samples'], samples['first'], samples['last']) == (1000, 1e-4, 0.1)
+    assert (samples['head'], samples['lost'], samples['complaint']) == (0, 0, '')
+    assert told['chatter'] == [{'time': 0.04, 'topic': '/chatter_monitor/chatter', 'flag': True}]
+    before, after = told['linear_model']['/lathe/samples']
+    assert (before['time'], after['time']) == (0.0, 0.04)
+    # The growth rates of the paper's runs, as its reproduction has them.
+    assert before['open']['growth_rate'] == pytest.approx(-8.999066, abs=1e-6)
+    assert before['seated']['growth_rate'] == pytest.approx(1.708234, abs=1e-6)
+    assert after['open']['growth_rate'] == pytest.approx(13.652715, abs=1e-6)
+    assert (before['open']['stable'], after['open']['stable']) == (True, False)
+
+
+def test_a_lathe_that_was_started_again_is_judged_by_its_own_parameters() -> None:
+    journal = Journal()
+    told = [(parameters_of(VirtualLathe()), 2), (parameters_of(VirtualLathe(cut=Cut(7000.0))), 12)]
+    deeper = Cut(7000.0, 0.001)
+    for at, sentence in (
+        (1, BEGINNING),
+        (11, BEGINNING),
+        (13, change_sentence(0.5, Cut(7000.0), deeper)),
+    ):
+        data = log_bytes('lathe', sentence, at)
+        journal.hear('/rosout', LOG_TYPE, data, at, at)
+    heard(journal, VirtualLathe(), at=14)
+    values = closing_summary(journal, {'/lathe': told})
+    verdicts = json.loads(values['linear_model'])['/lathe/samples']
+    cuts = [(v['time'], v['spindle_speed_rpm'], v['depth_of_cut']) for v in verdicts]
+    assert cuts == [(0.0, 3000.0, 0.0005), (0.0, 7000.0, 0.0005), (0.5, 7000.0, 0.001)]
+
+
+def heard(journal: Journal, lathe: VirtualLathe, *, at: int) -> None:
+    data = samples_bytes(lathe.advance(20))
+    journal.hear('/lathe/samples', SAMPLES_TYPE, data, at, at)
+
+
+def test_what_is_missing_is_counted_by_the_times_of_the_samples() -> None:
+    journal, lathe = Journal(), VirtualLathe()
+    lathe.advance(140)
+    for k in range(60):
+        if k == 30:
+            lathe.advance(60)
+        heard(journal, lathe, at=k * TICK)
+    samples = journal.samples['/lathe/samples']
+    assert samples.head == 140
+    assert (samples.continuity.lost, samples.continuity.gaps) == (60, 1)
+    assert samples.silences == 0
+
+
+def test_silence_is_noticed_where_blocks_come_often_and_not_where_they_never_did() -> None:
+    journal, lathe = Journal(), VirtualLathe()
+    for k in range(60):
+        heard(journal, lathe, at=k * TICK + (k >= 40) * 500_000_000)
+    samples = journal.samples['/lathe/samples']
+    assert (samples.silences, samples.longest) == (1, pytest.approx(0.502))
+    slow = Journal()
+    for k in range(60):
+        heard(slow, lathe, at=k * 200_000_000)
+    assert slow.samples['/lathe/samples'].silences == 0
+
+
+def test_a_message_that_is_no_block_is_told_and_harms_nothing() -> None:
+    journal, lathe = Journal(), VirtualLathe()
+    heard(journal, lathe, at=0)
+    journal.hear('/lathe/samples', SAMPLES_TYPE, b'\x00\x01\x00\x00nonsense', 1, 1)
+    journal.hear('/lathe/samples', SAMPLES_TYPE, samples_bytes(lathe.advance(20))[:-1], 2, 2)
+    assert 'cut off' in journal.samples['/lathe/samples'].complaint
+    heard(journal, lathe, at=3)
+    assert journal.samples['/lathe/samples'].continuity.samples == 40
+    assert journal.messages['/lathe/samples'] == 4

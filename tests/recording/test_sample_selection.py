@@ -1,0 +1,54 @@
+"""What a caller may ask of a run: a mistake is one sentence, never a wrong answer."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.parameters import parameters_of
+from lathe_chatter.recording import LatheRun, Run, read_run
+
+
+@pytest.fixture(scope='module')
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    folder = tmp_path_factory.mktemp('choice') / 'run'
+    lathe = VirtualLathe()
+    with LatheRun(folder, parameters_of(lathe)) as record:
+        record.take(lathe.advance(100))
+    return read_run(folder)
+
+
+@pytest.mark.parametrize(
+    ('asked', 'sentence'),
+    [
+        ({'columns': 'time'}, "columns is 'time': it must be a list of names of columns."),
+        ({'columns': 5}, 'columns is 5: it must be a list of names of columns.'),
+        ({'columns': []}, 'columns is []: it must be a list of names of columns.'),
+        ({'start': 'a'}, "start is 'a' s: it must be a number."),
+        ({'end': math.nan}, 'end is nan s: it must be a number.'),
+        ({'start': 2, 'end': 1}, 'start is 2.0 s: it must be at most the end, 1 s.'),
+    ],
+    ids=str,
+)
+def test_a_wish_that_cannot_be_met_is_one_sentence(
+    run: Run, asked: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(LatheChatterError) as refused:
+        run.samples(**asked)
+    assert str(refused.value) == sentence
+
+
+def test_a_topic_without_samples_is_told_with_those_that_have_some(run: Run) -> None:
+    with pytest.raises(LatheChatterError, match=r'of the topic /x: .* are of /lathe/samples'):
+        run.samples('/x')
+
+
+def test_a_file_of_another_kind_is_no_run(tmp_path: Path) -> None:
+    (tmp_path / 'notes.md').write_text('# notes')
+    with pytest.raises(LatheChatterError, match=r'notes\.md is no MCAP file'):
+        read_run(tmp_path / 'notes.md')
