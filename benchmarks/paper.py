@@ -31,7 +31,7 @@ from lathe_chatter.knocks import (
     smallest_lasting_knock,
 )
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.config import Start
+from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.paper import PAPER_RUNS, find, reproduce_run
 from lathe_chatter.precompile import precompile
@@ -127,7 +127,7 @@ def knocks() -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         found = run_knock_map(
-            KnockGrid(Start(), speeds, depths, (5e-6,)), Path(folder, 'map.jsonl')
+            KnockGrid(LatheConfig(), speeds, depths, (5e-6,)), Path(folder, 'map.jsonl')
         )
         spent = time.perf_counter() - start
     limits = list(found.limits.values())

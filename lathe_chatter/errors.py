@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class LatheChatterError(Exception):
     """Base of every error that the package raises on purpose; its text is for people."""
@@ -34,3 +38,17 @@ class LayoutError(LatheChatterError, ValueError):
 def reason_of(error: OSError) -> str:
     """Why the system refused, in its words: without the number and the file, which is known."""
     return error.strerror or str(error)
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name that may have been meant by one that is not.
+
+    It is like the whole of it, or like one of its words, as `depht` for depth_of_cut.
+    """
+    names = list(known)
+    near = get_close_matches(name, names, n=1)
+    if near:
+        return near[0]
+    words = {word: full for full in reversed(names) for word in re.split(r'[_.]', full)}
+    like = get_close_matches(name, words, n=1, cutoff=0.75)
+    return words[like[0]] if like else None

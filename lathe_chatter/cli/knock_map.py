@@ -19,7 +19,7 @@ from rich.progress import (
 )
 
 from lathe_chatter.cli.console import print_json
-from lathe_chatter.cli.parameter_options import add_parameter_options, start_of
+from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockMap, Margin, run_knock_map
 from lathe_chatter.model import Cut
@@ -82,7 +82,7 @@ def run(options: Namespace) -> int:
         _axis(option, field, getattr(options, option)) for option, field, _ in _AXES
     )
     grid = KnockGrid(
-        start_of(options), speeds, depths, clearances,
+        config_of(options), speeds, depths, clearances,
         options.reach, options.step, options.tolerance,
     )  # fmt: skip
     console = Console(stderr=options.json, highlight=False)
@@ -153,7 +153,7 @@ def _show(knocks: KnockMap, console: Console) -> None:
     if finite:
         point, limit = min(finite, key=lambda entry: abs(entry[1].impulse))
         grid = knocks.grid
-        stable = contact_at(grid.start.machine, grid.cut_at(point))
+        stable = contact_at(grid.config.machine, grid.cut_at(point))
         console.print(
             f'Weakest: {point.spindle_speed_rpm:g} rev/min, {point.depth_of_cut * 1e3:.4g} mm '
             f'(limit {stable.limit * 1e3:.4g} mm), clearance '

@@ -13,9 +13,9 @@ from rich.console import Console
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.cli.console import print_json
-from lathe_chatter.cli.parameter_options import add_parameter_options, start_of
+from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import LatheChatterError, ParameterError
-from lathe_chatter.lathe.config import Start
+from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.report.stability_chart import chart_speeds, draw_lobes
@@ -65,33 +65,33 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Draw and print the chart."""
-    start = start_of(options)
+    config = config_of(options)
     low, high = _SPEED.check('--from', options.low), _SPEED.check('--to', options.high)
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
     speeds = chart_speeds(low, high)
     limits = safe_limit(
-        start.machine, start.cut, speeds, tool_leaves_cut=start.setup.tool_leaves_cut
+        config.machine, config.cut, speeds, tool_leaves_cut=config.setup.tool_leaves_cut
     )
     top = _top(limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
     console = Console(stderr=options.json, highlight=False)
-    varied = start.cut.speed_variation_amplitude > 0.0
+    varied = config.cut.speed_variation_amplitude > 0.0
     growth = None
     if options.map or varied:
         with console.status('Computing the growth rates ...'):
-            growth = _map(start, low, high, top, varied=varied)
+            growth = _map(config, low, high, top, varied=varied)
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
-        draw_lobes(start, limits, growth, top, options.output)
+        draw_lobes(config, limits, growth, top, options.output)
         if options.csv is not None:
-            _write_csv(options.csv, start, limits)
+            _write_csv(options.csv, config, limits)
     except OSError as error:
         raise OutputError(f'{error.filename} cannot be written: {error.strerror}.') from None
-    _show(start, limits, console)
+    _show(config, limits, console)
     console.print(f'picture  {options.output}', soft_wrap=True)
     if options.json:
-        print_json(_figures(start, limits, growth))
+        print_json(_figures(config, limits, growth))
     return 0
 
 
@@ -101,43 +101,43 @@ def _top(limits: SafeLimit) -> float:
     return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
 
 
-def _map(start: Start, low: float, high: float, top: float, *, varied: bool) -> GrowthMap:
+def _map(config: LatheConfig, low: float, high: float, top: float, *, varied: bool) -> GrowthMap:
     columns, rows = _VARIED_MAP if varied else _MAP
     return growth_map(
-        start.machine,
-        start.cut,
+        config.machine,
+        config.cut,
         np.linspace(low, high, columns),
         np.linspace(top / rows, top, rows),
-        tool_leaves_cut=start.setup.tool_leaves_cut,
+        tool_leaves_cut=config.setup.tool_leaves_cut,
     )
 
 
-def _columns(start: Start, limits: SafeLimit) -> dict[str, Array]:
+def _columns(config: LatheConfig, limits: SafeLimit) -> dict[str, Array]:
     """The chart as columns; without what the machine has not."""
     columns = {
         'spindle_speed_rpm': limits.spindle_speed_rpm,
         'safe_depth': limits.depth_of_cut,
         'open_limit': limits.open_limit,
     }
-    if start.cut.bearing_contact is not BearingContact.NONE:
+    if config.cut.bearing_contact is not BearingContact.NONE:
         columns |= {'seated_limit': limits.seated_limit, 'seating_line': limits.seating_line}
     return columns
 
 
-def _write_csv(path: Path, start: Start, limits: SafeLimit) -> None:
+def _write_csv(path: Path, config: LatheConfig, limits: SafeLimit) -> None:
     """Limits over speed, m and rev/min; an infinite limit is `inf`."""
-    columns = _columns(start, limits)
+    columns = _columns(config, limits)
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
-def _figures(start: Start, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
+def _figures(config: LatheConfig, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
     """As JSON holds it: an infinite limit is null."""
     found: dict[str, Any] = {
         name: [value if math.isfinite(value) else None for value in values.tolist()]
-        for name, values in _columns(start, limits).items()
+        for name, values in _columns(config, limits).items()
     }
     if growth is not None:
         found['map'] = {
@@ -146,13 +146,13 @@ def _figures(start: Start, limits: SafeLimit, growth: GrowthMap | None) -> dict[
             'growth_rate': growth.growth_rate.tolist(),
             'seated': growth.seated.tolist(),
         }
-    return {'parameters': start.parameters(), **found}
+    return {'parameters': config.parameters(), **found}
 
 
-def _show(start: Start, limits: SafeLimit, console: Console) -> None:
+def _show(config: LatheConfig, limits: SafeLimit, console: Console) -> None:
     """The lowest limits, and what holds at the speed of the cut."""
     names = [('open', limits.open_limit)]
-    if start.cut.bearing_contact is not BearingContact.NONE:
+    if config.cut.bearing_contact is not BearingContact.NONE:
         names.append(('on its bearing', limits.seated_limit))
     names.append(('safe', limits.depth_of_cut))
     for name, values in names:

@@ -6,52 +6,48 @@ from argparse import ArgumentParser, BooleanOptionalAction, Namespace
 from collections.abc import Iterable
 from typing import Any
 
-from lathe_chatter.lathe.config import Start, parameter_names, start_from
-from lathe_chatter.model import BearingContact
+from lathe_chatter.lathe.config import LatheConfig, config_from
+from lathe_chatter.model.parameters import LATHE
 
 
 def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()) -> None:
     """Declare an option for every parameter of a lathe, but for some."""
-    usual = Start().parameters()
     group = parser.add_argument_group('the lathe', 'in SI units; speeds in rev/min')
-    for name, limits in parameter_names():
-        if name in without:
+    for row in LATHE:
+        if row.node_only or row.name in without:
             continue
-        flag = '--' + name.replace('_', '-')
-        if isinstance(usual[name], bool):
+        flag = '--' + row.name.replace('_', '-')
+        text = row.meaning.replace('%', '%%')
+        if isinstance(row.default, bool):
+            usual = 'yes' if row.default else 'no'
             group.add_argument(
-                flag, dest=name, action=BooleanOptionalAction, default=None,
-                help='whether the force ends where the chip does (default: yes)',
+                flag, dest=row.name, action=BooleanOptionalAction, default=None,
+                help=f'{text} (default: {usual})',
             )  # fmt: skip
-        elif limits is None:
-            choices = [contact.value for contact in BearingContact]
-            group.add_argument(flag, dest=name, choices=choices, help=f'(default: {usual[name]})')
-        else:
-            unit = f', {limits.unit}' if limits.unit else ''
-            text = f'{limits.meaning}{unit} (default: {usual[name]:g})'
+        elif row.choices is not None:
+            choices = [choice.value for choice in row.choices]
             group.add_argument(
-                flag, dest=name, type=_number, metavar='X', help=text.replace('%', '%%')
+                flag, dest=row.name, choices=choices, help=f'(default: {row.default})'
             )
+        else:
+            unit = f', {row.unit}' if row.unit else ''
+            # A text that is no number stays one: the parameter then says what it must be.
+            group.add_argument(
+                flag, dest=row.name, type=row.parsed, metavar='X',
+                help=f'{text}{unit} (default: {row.default:g})',
+            )  # fmt: skip
 
 
 def given_parameters(options: Namespace) -> dict[str, Any]:
     """The parameters that were given, by name."""
-    values = {name: getattr(options, name, None) for name, _ in parameter_names()}
+    values = {row.name: getattr(options, row.name, None) for row in LATHE}
     return {name: value for name, value in values.items() if value is not None}
 
 
-def start_of(options: Namespace) -> Start:
+def config_of(options: Namespace) -> LatheConfig:
     """The lathe that the options describe.
 
     Raises:
         ParameterError: If a value is not allowed.
     """
-    return start_from(given_parameters(options))
-
-
-def _number(text: str) -> Any:
-    """A number, or the text itself: the parameter then says what it must be."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    return config_from(given_parameters(options))

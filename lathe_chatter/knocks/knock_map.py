@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
-from lathe_chatter.lathe.config import Start, start_from
+from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
 
 _KIND = 'lathe_chatter knock map 1'
@@ -41,7 +41,7 @@ class KnockGrid:
     """What a map is of: every speed with every depth and every clearance.
 
     Attributes:
-        start: Machine and cut; speed, depth and clearance are those below.
+        config: Machine and cut; speed, depth and clearance are those below.
         speeds: rev/min.
         depths: m.
         clearances: m.
@@ -50,7 +50,7 @@ class KnockGrid:
         tolerance: The same.
     """
 
-    start: Start
+    config: LatheConfig
     speeds: tuple[float, ...]
     depths: tuple[float, ...]
     clearances: tuple[float, ...]
@@ -65,12 +65,12 @@ class KnockGrid:
 
     def cut_at(self, point: Point) -> Cut:
         """The cut at a point."""
-        return self.start.cut.with_changes(**point._asdict())
+        return self.config.cut.with_changes(**point._asdict())
 
     def limit_at(self, point: Point) -> KnockLimit:
         """Compute a point."""
         return smallest_lasting_knock(
-            self.start.machine,
+            self.config.machine,
             self.cut_at(point),
             reach=self.reach,
             step=self.step,
@@ -82,7 +82,7 @@ class KnockGrid:
         names = ('speeds', 'depths', 'clearances')
         axes = {name: list(getattr(self, name)) for name in names}
         search = {name: getattr(self, name) for name in ('reach', 'step', 'tolerance')}
-        return {'kind': _KIND, 'parameters': self.start.parameters(), **axes, **search}
+        return {'kind': _KIND, 'parameters': self.config.parameters(), **axes, **search}
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _grid(header: dict[str, Any]) -> KnockGrid:
         tuple(header[name]) for name in ('speeds', 'depths', 'clearances')
     )
     return KnockGrid(
-        start_from(header['parameters']), speeds, depths, clearances,
+        config_from(header['parameters']), speeds, depths, clearances,
         header['reach'], header['step'], header['tolerance'],
     )  # fmt: skip
 

@@ -16,8 +16,8 @@ from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.lathe.integrator import propagation, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import steps_per_sample
-from lathe_chatter.lathe.setup import LatheSetup
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
+from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity
 
 _STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)

@@ -13,9 +13,9 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.integrator import propagation, stepper, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import constants_of
-from lathe_chatter.lathe.setup import LatheSetup
 from lathe_chatter.lathe.state import LatheState, StateError, differences
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity, count_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

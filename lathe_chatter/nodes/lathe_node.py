@@ -11,8 +11,10 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe.parameters import cut_from, lathe_from
+from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.model import Cut
+from lathe_chatter.model.parameter_table import Value
+from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
 from lathe_chatter.nodes import control_services, simulation_services
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
@@ -22,8 +24,6 @@ from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.pacing import SECOND, Pacer
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameter_table import Value
-from lathe_chatter.nodes.parameters import CUT_ROWS, LATHE, samples_per_tick
 from lathe_chatter.nodes.scheduling import RealTime, ask_for_short_slices
 from lathe_chatter.nodes.tick_loop import spin_in_ticks
 from lathe_chatter.nodes.tick_statistics import LatheMeter
@@ -67,7 +67,7 @@ class LatheNode(ParameterNode):
         self._sample_rate: float = values['sample_rate']
         self._samples_per_tick = samples_per_tick(self._sample_rate, values['tick_rate'])
         precompile()  # compiled before the first tick is due
-        self._lathe = lathe_from(values)
+        self._lathe = recorded_config(values).lathe()
         self._pending: Cut | None = None
         self._topics = LatheTopics(
             self, values['tick_rate'], self._factor, publish_clock=values['publish_clock']
@@ -258,7 +258,7 @@ class LatheNode(ParameterNode):
         """Start again at time zero with the present parameters: the same run, bit for bit."""
         answer = self._control.reset()
         self._pending = None
-        before, self._lathe = self._lathe, lathe_from(self.values)
+        before, self._lathe = self._lathe, recorded_config(self.values).lathe()
         self._record.restarted(before.time, before.cut, self._lathe.cut)
         self._start_clock()
         self.get_logger().info(answer.message)

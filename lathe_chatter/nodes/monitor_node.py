@@ -16,8 +16,8 @@ from std_msgs.msg import Bool, Float64, String
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.parameters import machine_from
 from lathe_chatter.model import Machine
+from lathe_chatter.model.parameters import machine_from
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.monitor_sentences import clearance, details, onset
 from lathe_chatter.nodes.node_main import run_node

@@ -15,7 +15,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import LatheChatterError, ParameterError
-from lathe_chatter.nodes.parameter_table import ParameterTable, Value
+from lathe_chatter.model.parameter_table import ParameterTable, Value
+from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 _OF_QOS = 'qos_overrides.'
@@ -49,7 +50,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         self._values = table.complete(self._take_overrides())
         for row in table:
             value = self._values[row.name]
-            self.declare_parameter(row.name, value, row.descriptor(), ignore_override=True)
+            self.declare_parameter(row.name, value, descriptor_of(row), ignore_override=True)
         self.add_pre_set_parameters_callback(self._with_whole_numbers)
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._accept)

@@ -1,33 +1,23 @@
 """The parameters of the nodes: one table each, from which everything about them is made.
 
-Names, defaults, units, limits and meanings of the machine and the cut stand once, beside the
-fields of the model; what only a node has is added here. Descriptors, declarations, validation,
-the sentence of a refusal and the tables of the README come from these rows.
+The lathe's stand in model/parameters.py, for they are also those of scenarios, options and
+records; the monitor has the machine's, and the recorder its own.
 """
 
 from __future__ import annotations
 
-import math
 from enum import Enum
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe.parameters import machine_from
-from lathe_chatter.lathe.setup import SEED, LatheSetup
-from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model import Cut
+from lathe_chatter.model.parameter_table import ParameterTable, Row, Values
+from lathe_chatter.model.parameters import LATHE, MACHINE_ROWS, derived_machine
 from lathe_chatter.model.quantities import Quantity, limits_of
-from lathe_chatter.nodes.parameter_table import ParameterTable, Row, Values, rows_of
 
+__all__ = ['LATHE', 'MONITOR', 'RECORDER', 'ModelSource']
 
-def _derived_machine(given: Values) -> Values:
-    """Without a stiffness of its own the bearing has the paper's, k_bc = 0.5 k_wp."""
-    return {'bearing_stiffness': machine_from(given).bearing_stiffness}
-
-
-def _derived_lathe(given: Values) -> Values:
-    """The machine's derived values, once the two rates are known to agree."""
-    rates = {name: float(given.get(name, LATHE[name].default)) for name in _RATES}  # type: ignore[arg-type]  # checked numbers
-    samples_per_tick(rates['sample_rate'], rates['tick_rate'])
-    return _derived_machine(given)
+_SPEED_RANGE = ('slowest_speed', 'fastest_speed')
+_ADVISED = limits_of(Cut, 'spindle_speed_rpm')
 
 
 def _derived_monitor(given: Values) -> Values:
@@ -36,78 +26,7 @@ def _derived_monitor(given: Values) -> Values:
     if slowest >= fastest:
         allowed = f'above slowest_speed, which is {slowest:g} rev/min'
         raise ParameterError('fastest_speed', fastest, 'rev/min', allowed)
-    return _derived_machine(given)
-
-
-def samples_per_tick(sample_rate: float, tick_rate: float) -> int:
-    """How many samples each tick has.
-
-    Raises:
-        ParameterError: If it is no whole number.
-    """
-    ratio = sample_rate / tick_rate
-    count = round(ratio)
-    if count < 1 or not math.isclose(ratio, count, rel_tol=1e-12):
-        raise ParameterError(
-            'sample_rate',
-            sample_rate,
-            'Hz',
-            f'a whole multiple of tick_rate, which is {tick_rate:g} Hz',
-        )
-    return count
-
-
-def _setup_row(name: str) -> Row:
-    """A number that a lathe is given at the start."""
-    limits = limits_of(LatheSetup, name)
-    return Row(name, getattr(LatheSetup(), name), limits.meaning, limits)
-
-
-_RATES = ('sample_rate', 'tick_rate')
-_SPEED_RANGE = ('slowest_speed', 'fastest_speed')
-_ADVISED = limits_of(Cut, 'spindle_speed_rpm')
-
-MACHINE_ROWS = tuple(rows_of(Machine()))
-CUT_ROWS = tuple(rows_of(Cut(), run_time=True))
-
-LATHE = ParameterTable(
-    (
-        *CUT_ROWS,
-        Row(
-            'real_time_factor',
-            1.0,
-            'simulated seconds per second; 0 is as fast as possible',
-            Quantity('', low=0.01, high=100.0, or_zero=True),
-            run_time=True,
-        ),
-        Row(
-            'tool_leaves_cut',
-            default=True,
-            meaning='total chip force that vanishes out of the cut; false: the linear force (2)',
-        ),
-        *MACHINE_ROWS,
-        _setup_row('spindle_acceleration'),
-        Row('tick_rate', 500.0, 'rate of publication', Quantity('', 'Hz', low=1.0, high=5e3)),
-        _setup_row('sample_rate'),
-        Row('seed', 0, SEED.meaning, SEED),
-        Row('publish_clock', default=False, meaning='whether this node drives /clock'),
-        Row(
-            'realtime_priority',
-            1,
-            'priority (SCHED_RR) to ask for, where permitted, while it keeps real time; 0: none',
-            Quantity('', high=99.0),
-        ),
-        Row(
-            'await_readers',
-            0,
-            'readers of ~/samples that the first tick waits for, unless ~/pause says otherwise',
-            Quantity('', high=1000.0),
-        ),
-        Row('record', '', 'folder of a run that this node records by itself; empty: none'),
-    ),
-    _derived_lathe,
-)
-"""Node `lathe`."""
+    return derived_machine(given)
 
 
 class ModelSource(str, Enum):

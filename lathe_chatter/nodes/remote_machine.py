@@ -10,9 +10,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe.parameters import machine_from
 from lathe_chatter.model import Machine
-from lathe_chatter.nodes.parameters import MACHINE_ROWS
+from lathe_chatter.model.parameters import MACHINE_ROWS, machine_from
 
 _NAMES = [row.name for row in MACHINE_ROWS]
 

@@ -12,9 +12,9 @@ from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.nodes.deferred_signals import HeldSignals
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
-from lathe_chatter.nodes.parameters import LATHE
 from lathe_chatter.nodes.process_group import Cell, RunFailedError
 from lathe_chatter.scenario import Scenario
 

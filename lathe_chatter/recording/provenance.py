@@ -39,10 +39,10 @@ _CORE = (
     'arrays.py',
     'compiled.py',
     'lathe/integrator/*.py',
-    'lathe/setup.py',
     'lathe/state.py',
     'lathe/virtual_lathe.py',
     'model/cut.py',
+    'model/lathe_setup.py',
     'model/machine.py',
     'model/quantities.py',
 )

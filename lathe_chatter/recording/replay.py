@@ -10,9 +10,10 @@ import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.cut_events import BEGINNING_AGAIN, Change, Knock
-from lathe_chatter.lathe.parameters import cut_from, lathe_from
 from lathe_chatter.model import Cut
+from lathe_chatter.model.parameters import cut_from
 from lathe_chatter.recording.cut_log import Told
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import Blocks
@@ -70,7 +71,7 @@ class Replay:
         self._act = -1
         self._waiting: list[Change | Knock] = []
         self._parameters = told.parameters
-        self._lathe = lathe_from(told.parameters)
+        self._lathe = recorded_config(told.parameters).lathe()
 
     def _begin(self, published: int) -> None:
         """Begin the act of a block, at time zero, with the cut that those before it left.
@@ -93,7 +94,7 @@ class Replay:
             )
         cut = self._started(cut)
         values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
-        self._lathe = lathe_from({**self._parameters, **values})
+        self._lathe = recorded_config({**self._parameters, **values}).lathe()
         self.whole = bool(acts[self._act].beginning)
         self._waiting = list(acts[self._act].happenings)
 

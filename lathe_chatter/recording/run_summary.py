@@ -9,8 +9,8 @@ from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.cut_events import Change
-from lathe_chatter.lathe.parameters import cut_from, machine_from
 from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.recording.cut_session import Journal, SamplesHeard
 
 SUMMARY = 'lathe_chatter/summary'

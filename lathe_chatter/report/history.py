@@ -17,8 +17,8 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.lathe.cut_events import Change, Knock
-from lathe_chatter.lathe.parameters import cut_from, machine_from
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.cut_log import told_by
 from lathe_chatter.recording.run import Samples

@@ -64,8 +64,8 @@ def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
             shading='nearest', rasterized=True,
         )  # fmt: skip
         axes.figure.colorbar(colours, ax=axes, label='smallest lasting knock / (mN s)', pad=0.01)
-    cut = of.start.cut.with_changes(bearing_clearance=clearance)
-    limits = safe_limit(of.start.machine, cut, chart_speeds(speeds[0], speeds[-1]))
+    cut = of.config.cut.with_changes(bearing_clearance=clearance)
+    limits = safe_limit(of.config.machine, cut, chart_speeds(speeds[0], speeds[-1]))
     draw_limits(axes, limits, cut.bearing_contact, of.depths[-1], shade=False)
     axes.set_ylim(depths[0] - 0.5 * (depths[1] - depths[0]), depths[-1])
     axes.fill_between([], [], color='#D8F0E7', label='no lasting knock found')

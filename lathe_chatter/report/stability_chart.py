@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.lathe.config import Start
+from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact
 from lathe_chatter.report.style import LINE, OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.stability import GrowthMap, SafeLimit
@@ -29,12 +29,16 @@ def chart_speeds(low_rpm: float, high_rpm: float) -> Array:
 
 
 def draw_lobes(
-    start: Start, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
+    config: LatheConfig,
+    limits: SafeLimit,
+    growth: GrowthMap | None,
+    depth_limit: float,
+    path: Path,
 ) -> None:
     """Draw a chart with its point of operation, as PNG and SVG.
 
     Args:
-        start: The machine and its cut.
+        config: The machine and its cut.
         limits: Over rising speeds.
         growth: To colour the chart with, or None.
         depth_limit: Top of the chart, m.
@@ -42,7 +46,7 @@ def draw_lobes(
     """
     figure = new_figure(11.0, 6.0)
     axes = figure.subplots()
-    cut = start.cut
+    cut = config.cut
     varied = cut.speed_variation_amplitude > 0.0
     if growth is not None:
         _draw_growth(axes, growth, zero=varied)

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from lathe_chatter.errors import LatheChatterError, ParameterError, reason_of
-from lathe_chatter.model import Cut
+from lathe_chatter.errors import LatheChatterError, ParameterError, nearest_name, reason_of
+from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.model.quantities import Quantity
 
 RECOMMENDED = 'recommended'
@@ -149,7 +148,10 @@ def load_scenario(path: Path) -> Scenario:
         name=name,
         title=str(raw.get('title', name)),
         duration=duration,
-        parameters=_mapping(raw, 'parameters', where),
+        parameters={
+            name: LATHE[name].parsed(value) if name in LATHE else value
+            for name, value in _mapping(raw, 'parameters', where).items()
+        },
         steps=tuple(_step(entry, f'{where}: step {k + 1}') for k, entry in enumerate(steps)),
         expect=expect,
     )
@@ -189,10 +191,8 @@ def _step(entry: Any, where: str) -> Step:
     changes = _mapping(entry, 'set', where)
     if not changes:
         raise ScenarioError(f'{where}: set must name at least one parameter.')
-    for name, value in changes.items():
-        _check_change(name, value, where)
     return Step(
-        changes=changes,
+        changes={name: _change(name, value, where) for name, value in changes.items()},
         at=_time(entry, 'at', where),
         when=when,
         after=_time(entry, 'after', where) or 0.0,
@@ -200,17 +200,17 @@ def _step(entry: Any, where: str) -> Step:
     )
 
 
-def _check_change(name: str, value: Any, where: str) -> None:
-    """Refuse what the lathe would refuse when its time comes."""
-    if name == 'real_time_factor' or (name, value) == ('spindle_speed_rpm', RECOMMENDED):
-        return  # known to the node alone, and to the monitor
-    if name not in Cut.__dataclass_fields__:
-        known = ', '.join(Cut.__dataclass_fields__)
-        near = get_close_matches(name, Cut.__dataclass_fields__, n=1)
-        hint = f'did you mean {near[0]}?' if near else f'what can change is {known}.'
+def _change(name: str, value: Any, where: str) -> Any:
+    """The value that a parameter changes to; refused is what the lathe would refuse then."""
+    if (name, value) == ('spindle_speed_rpm', RECOMMENDED):
+        return value
+    changing = [row.name for row in LATHE if row.run_time]
+    if name not in changing:
+        near = nearest_name(name, changing)
+        hint = f'did you mean {near}?' if near else f'what can change is {", ".join(changing)}.'
         raise ScenarioError(f'{where}: {name!r} cannot change while the lathe cuts: {hint}')
     try:
-        Cut(**{name: value})
+        return LATHE[name].check(LATHE[name].parsed(value))
     except ParameterError as error:
         raise ScenarioError(f'{where}: {error}') from None
 

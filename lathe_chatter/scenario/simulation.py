@@ -14,8 +14,9 @@ from typing import Any
 
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.config import start_from
+from lathe_chatter.lathe.config import config_from
 from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, knock_sentence
+from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.scenario import CLEARED, FLAGGED, RECOMMENDED, Scenario, Step
@@ -25,8 +26,6 @@ _BLOCK, _WATCHED_BLOCK = 0.05, 0.01
 _REPORT_PERIOD = 0.02
 _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 _MONITOR = '/chatter_monitor'
-_OF_NODES = {'real_time_factor', 'publish_clock', 'tick_rate', 'record'}
-"""Parameters of the node `lathe` that mean nothing here."""
 
 Tell = Callable[[float, str], None]
 """Takes simulated time, s, and what happened then."""
@@ -82,14 +81,13 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
         RunExistsError: If the folder exists.
         OSError: If it cannot be written.
     """
-    given = {n: v for n, v in scenario.parameters.items() if n not in _OF_NODES}
-    start = start_from(given)
-    lathe = start.lathe()
-    with LatheRun(folder, start.parameters(), simulated=True) as run:
+    config = config_from(scenario.parameters)
+    lathe = config.lathe()
+    with LatheRun(folder, config.parameters(), simulated=True) as run:
         run.tell(BEGINNING)
         player = _Player(lathe, run, scenario, knocks, tell)
         if monitor:
-            player.watch(ChatterDetector(start.machine))
+            player.watch(ChatterDetector(config.machine))
         while player.play_block():
             progress(lathe.time)
     return Simulated(
@@ -176,7 +174,7 @@ class _Player:
         changes = {
             name: self._resolved(value)
             for name, value in step.changes.items()
-            if name not in _OF_NODES
+            if name not in LATHE or not LATHE[name].node_only
         }
         cut = self._lathe.cut.with_changes(**changes)
         sentence = change_sentence(self._lathe.time, self._lathe.cut, cut)

@@ -10,7 +10,7 @@ from support.recorded import number, topic
 
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.parameters import parameters_of
+from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter, read_run
 
 

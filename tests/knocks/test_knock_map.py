@@ -8,10 +8,16 @@ import pytest
 
 from lathe_chatter.knocks import KnockGrid, Margin, read_knock_map, run_knock_map
 from lathe_chatter.knocks.knock_map import KnockMapError
-from lathe_chatter.lathe.config import Start, start_from
+from lathe_chatter.lathe.config import LatheConfig, config_from
 
 GRID = KnockGrid(
-    Start(), (3000.0, 3100.0), (0.5e-3, 0.66e-3), (10e-6,), reach=4.0, step=1.4, tolerance=0.2
+    LatheConfig(),
+    (3000.0, 3100.0),
+    (0.5e-3, 0.66e-3),
+    (10e-6,),
+    reach=4.0,
+    step=1.4,
+    tolerance=0.2,
 )
 
 
@@ -46,7 +52,7 @@ def test_what_was_interrupted_is_continued(tmp_path: Path) -> None:
 
 def test_another_map_is_not_written_into(tmp_path: Path) -> None:
     path = tmp_path / 'map.jsonl'
-    other = KnockGrid(start_from({'feed_speed': 0.005}), (3000.0,), (0.1e-3,), (5e-6,))
+    other = KnockGrid(config_from({'feed_speed': 0.005}), (3000.0,), (0.1e-3,), (5e-6,))
     run_knock_map(other, path)
     before = path.read_bytes()
     with pytest.raises(KnockMapError, match='another map'):

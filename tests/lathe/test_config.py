@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe.config import Start, parameter_names, start_from
+from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import BearingContact
+from lathe_chatter.model.parameters import LATHE
 
 
 def test_parameters_come_back_as_they_were() -> None:
@@ -19,16 +20,16 @@ def test_parameters_come_back_as_they_were() -> None:
         'seed': 7,
         'sample_rate': 2e4,
     }
-    start = start_from(given)
-    assert start.cut.bearing_contact is BearingContact.NONE
-    assert start.machine.tool.mass == 0.06
-    assert {name: start.parameters()[name] for name in given} == given
-    assert start_from(start.parameters()) == start
-    assert set(Start().parameters()) == {name for name, _ in parameter_names()}
+    config = config_from(given)
+    assert config.cut.bearing_contact is BearingContact.NONE
+    assert config.machine.tool.mass == 0.06
+    assert {name: config.parameters()[name] for name in given} == given
+    assert config_from(config.parameters()) == config
+    assert set(LatheConfig().parameters()) == {row.name for row in LATHE if not row.node_only}
 
 
 def test_the_lathe_is_the_one_described() -> None:
-    lathe = start_from({'spindle_speed_rpm': 4000.0, 'sample_rate': 5e3, 'seed': 3}).lathe()
+    lathe = config_from({'spindle_speed_rpm': 4000.0, 'sample_rate': 5e3, 'seed': 3}).lathe()
     assert (lathe.cut.spindle_speed_rpm, lathe.sample_rate, lathe.setup.seed) == (4000.0, 5e3, 3)
 
 
@@ -44,4 +45,4 @@ def test_the_lathe_is_the_one_described() -> None:
 )
 def test_what_is_wrong_is_named(values: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
-        start_from(values)
+        config_from(values)

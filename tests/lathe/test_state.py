@@ -9,9 +9,9 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.setup import LatheSetup
 from lathe_chatter.lathe.state import LatheState, StateError
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
+from lathe_chatter.model.lathe_setup import LatheSetup
 
 _MACHINE = Machine(Mode(0.04, 800.0, 0.03), Mode(0.06, 600.0, 0.04), cutting_coefficient=3e6)
 

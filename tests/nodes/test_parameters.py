@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe.parameters import cut_from, machine_from
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
-from lathe_chatter.nodes.parameter_table import Row
-from lathe_chatter.nodes.parameters import LATHE, MONITOR, samples_per_tick
+from lathe_chatter.model.parameter_table import Row
+from lathe_chatter.model.parameters import LATHE, cut_from, machine_from, samples_per_tick
+from lathe_chatter.nodes.parameter_descriptor import descriptor_of
+from lathe_chatter.nodes.parameters import MONITOR
 
 CONTRACT = {
     'spindle_speed_rpm': (3000.0, 'rev/min', True),
@@ -55,7 +56,7 @@ def test_the_table_keeps_the_contract() -> None:
 @pytest.mark.parametrize('row', [*LATHE, *MONITOR], ids=lambda row: row.name)
 def test_every_row_accepts_its_default_and_says_what_it_is(row: Row) -> None:
     assert row.check(row.default) == row.default
-    descriptor = row.descriptor()
+    descriptor = descriptor_of(row)
     assert len(row.meaning) > 5
     assert row.unit in descriptor.description
     assert row.allowed in descriptor.additional_constraints
@@ -71,7 +72,7 @@ def test_no_double_accepts_what_is_no_number(row: Row) -> None:
 
 @pytest.mark.parametrize('row', [r for r in LATHE if isinstance(r.default, float)], ids=str)
 def test_every_double_has_a_range_that_holds_its_limits(row: Row) -> None:
-    (ends,) = row.descriptor().floating_point_range
+    (ends,) = descriptor_of(row).floating_point_range
     assert ends.from_value <= row.default <= ends.to_value
     assert math.isfinite(ends.from_value)
     assert math.isfinite(ends.to_value)

@@ -15,7 +15,7 @@ from support.recorded import NUMBER, STORE
 from lathe_chatter.arrays import Array
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.parameters import parameters_of
+from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

@@ -12,14 +12,15 @@ from support.recorded import topic
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.cut_events import (
     BEGINNING,
     BEGINNING_AGAIN,
     change_sentence,
     knock_sentence,
 )
-from lathe_chatter.lathe.parameters import lathe_from, parameters_of
 from lathe_chatter.model import Cut, Machine, Mode
+from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
 from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.ros_messages import parameters_bytes
@@ -149,7 +150,7 @@ def test_a_reset_begins_again(tmp_path: Path) -> None:
         deeper = lathe.cut.with_changes(depth_of_cut=0.0008)
         run.tell(change_sentence(lathe.time, lathe.cut, deeper))
         run.tell(BEGINNING_AGAIN)
-        lathe = lathe_from({**parameters, 'depth_of_cut': 0.0008})
+        lathe = recorded_config({**parameters, 'depth_of_cut': 0.0008}).lathe()
         run.take(lathe.advance(300))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=700)
 
@@ -278,10 +279,10 @@ def test_what_happens_between_two_resets_or_in_a_pause_is_no_obstacle(tmp_path: 
             run.tell(BEGINNING_AGAIN)
             changed = lathe.cut.with_changes(depth_of_cut=depth)
             run.tell(change_sentence(0.0, lathe.cut, changed))
-            lathe = lathe_from({**parameters, 'depth_of_cut': depth})
+            lathe = recorded_config({**parameters, 'depth_of_cut': depth}).lathe()
         run.take(lathe.advance(100))
         run.tell(BEGINNING_AGAIN)
-        lathe = lathe_from({**parameters, 'depth_of_cut': 0.0007})
+        lathe = recorded_config({**parameters, 'depth_of_cut': 0.0007}).lathe()
         run.take(lathe.advance(100))
         run.tell(change_sentence(lathe.time, lathe.cut, Cut(sensor_noise=1e-8)))
         lathe.retune(Cut(sensor_noise=1e-8))

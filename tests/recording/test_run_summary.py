@@ -10,8 +10,8 @@ import pytest
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.cut_events import BEGINNING, change_sentence
-from lathe_chatter.lathe.parameters import parameters_of
 from lathe_chatter.model import Cut
+from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
 from lathe_chatter.recording.cut_session import Journal
 from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, samples_bytes

@@ -10,7 +10,7 @@ import pytest
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.parameters import parameters_of
+from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, Run, read_run
 
 

@@ -111,7 +111,9 @@ def test_the_least_that_a_scenario_needs_is_its_duration(tmp_path: Path) -> None
         ('duration: 1\nsteps: [{at: 1, set: {runout: deep}}]', "step 1: runout is 'deep' m"),
         ('duration: 1\nsteps: [{at: 1, set: {depth_of_cut: 5}}]', 'from 0 to 0.01 m'),
         ('duration: 1\nsteps: [{at: 1, set: {sample_rate: 5}}]', "'sample_rate' cannot change"),
-        ('duration: 1\nsteps: [{at: 1, set: {depth: 5}}]', 'what can change is'),
+        ('duration: 1\nsteps: [{at: 1, set: {depth: 5}}]', 'did you mean depth_of_cut?'),
+        ('duration: 1\nsteps: [{at: 1, set: {zzz: 5}}]', 'what can change is'),
+        ('duration: 1\nsteps: [{at: 1, set: {depth_of_cut: 1 mm}}]', "depth_of_cut is '1 mm' m"),
         ('duration: 1\nexpect: {flagged: 1}', 'expect.flagged must be true or false'),
         ('duration: 1\nexpect: {chatter: true}', "no key 'chatter'"),
     ],
@@ -136,3 +138,18 @@ def test_what_is_no_text_is_refused(tmp_path: Path) -> None:
 def test_an_unknown_scenario_names_those_that_exist() -> None:
     with pytest.raises(ScenarioError, match=r"'none\.yaml'.*clearance, no_clearance"):
         find_scenario('none.yaml')
+
+
+def test_numbers_that_yaml_takes_for_texts_are_numbers(tmp_path: Path) -> None:
+    text = (
+        'duration: 1\nparameters:\n  cutting_coefficient: 5.0e6'
+        '\n  bearing_clearance: "5e-06"\n  seed: "3"'
+        '\nsteps: [{at: 1, set: {depth_of_cut: 1.0e-3}}]'
+    )
+    scenario = load_scenario(_write(tmp_path, text))
+    assert scenario.parameters == {
+        'cutting_coefficient': 5e6,
+        'bearing_clearance': 5e-6,
+        'seed': 3,
+    }
+    assert scenario.steps[0].changes == {'depth_of_cut': 1e-3}

@@ -11,8 +11,8 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.integrator import propagation
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.setup import LatheSetup
 from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.lathe_setup import LatheSetup
 
 _TURN_PER_STEP = 0.05
 _MOST_STEPS = 200_000

@@ -1,21 +1,19 @@
-"""Rows of parameters, and what is made of them: nothing here knows which node has which.
+"""Rows of parameters, and what is made of them: nothing here knows who has which.
 
 A number is coerced only where nothing is lost: a whole number is accepted where a double belongs
-(`depth_of_cut:=0`, `spindle_speed_rpm:=6000`), at the start and at run time. Nothing else is.
+(`depth_of_cut:=0`, `spindle_speed_rpm:=6000`), at the start and at run time. A text that is a
+number is one where it was written as text: in a file or on a command line (`Row.parsed`).
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
-from difflib import get_close_matches
 from enum import Enum
 from typing import Any, TypeGuard
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, nearest_name
 from lathe_chatter.model.quantities import Quantity, check_choice, quantity_of
 
 Value = bool | int | float | str | list[str]
@@ -26,7 +24,7 @@ _LARGEST_EXACT_INTEGER = 2**53
 
 @dataclass(frozen=True)
 class Row:
-    """One parameter of a node.
+    """One parameter.
 
     Attributes:
         name: As `ros2 param` writes it, with dots where it belongs to a part of the machine.
@@ -35,6 +33,7 @@ class Row:
         limits: Unit and closed limits of a number; None for anything else.
         choices: The words that a text may be; None where any will do.
         run_time: Whether it may change while the node runs.
+        node_only: Whether it means something to a node alone, and nothing without ROS.
     """
 
     name: str
@@ -43,6 +42,7 @@ class Row:
     limits: Quantity | None = None
     choices: type[Enum] | None = None
     run_time: bool = False
+    node_only: bool = False
 
     @property
     def unit(self) -> str:
@@ -85,22 +85,15 @@ class Row:
                 return value
         raise ParameterError(self.name, value, self.unit, self.allowed)
 
-    def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows; a range makes rclpy itself refuse nan and inf."""
-        descriptor = ParameterDescriptor(
-            name=self.name,
-            description=f'{self.meaning}{self.unit and f" [{self.unit}]"}',
-            additional_constraints=f'must be {self.allowed}',
-            read_only=not self.run_time,
-        )
-        if self.limits is not None and isinstance(self.default, float):
-            low = 0.0 if self.limits.or_zero else self.limits.low
-            ends = FloatingPointRange(from_value=low, to_value=self.limits.high)
-            descriptor.floating_point_range = [ends]
-        elif self.limits is not None and isinstance(self.default, int):
-            low, high = int(self.limits.low), int(self.limits.high)
-            descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
-        return descriptor
+    def parsed(self, value: object) -> object:
+        """The number that a text is, where this is a number (YAML takes `5.0e6` for a text)."""
+        if not isinstance(value, str) or self.limits is None:
+            return value
+        with suppress(ValueError):
+            return int(value)
+        with suppress(ValueError):
+            return float(value)
+        return value
 
 
 def _fits(value: object, default: Value) -> TypeGuard[int]:
@@ -182,13 +175,7 @@ class ParameterTable:
 
     def nearest(self, name: str) -> str | None:
         """The parameter that may have been meant by a name that is none."""
-        near = get_close_matches(name, self._rows, n=1) or self._with_word_like(name)
-        return near[0] if near else None
-
-    def _with_word_like(self, name: str) -> list[str]:
-        """The first name one of whose words is like that, as `depht` for depth_of_cut."""
-        words = {word: row for row in reversed(self._rows) for word in re.split(r'[_.]', row)}
-        return [words[word] for word in get_close_matches(name, words, n=1, cutoff=0.75)]
+        return nearest_name(name, self._rows)
 
 
 def rows_of(instance: Any, *, prefix: str = '', run_time: bool = False) -> Iterator[Row]:
