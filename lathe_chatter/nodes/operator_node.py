@@ -17,7 +17,8 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.messages import samples_from_message
-from lathe_chatter.scenario import CLEARED, FLAGGED, RECOMMENDED, Scenario, Step
+from lathe_chatter.scenario import Scenario, Step
+from lathe_chatter.scenario.player import ScenarioPlayer
 
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -41,7 +42,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         time: Simulated time of the newest sample, s.
         amplitude: Largest displacement of the tool in the newest block of samples, m.
         state: The monitor's word for the cut.
-        said: What the monitor has said so far: FLAGGED and CLEARED.
+        player: Knows what is due, and what the monitor has said.
         failure: Why the scenario cannot go on, or None.
         playing: Whether samples are those of the lathe to play on; nothing is done before.
     """
@@ -52,13 +53,10 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         self.scenario = scenario
         self.time = 0.0
         self.state = 'waiting'
-        self.said: list[str] = []
+        self.player = ScenarioPlayer(scenario)
         self.failure: ScenarioFailedError | None = None
         self.playing = False
         self._tell = tell
-        self._steps = list(scenario.steps)
-        self._heard_before_step = 0
-        self._heard_at = 0.0
         self._in_flight = False
         self._estimates = dict.fromkeys(_ESTIMATES, math.nan)
         self._client = self.create_client(
@@ -77,7 +75,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
     @property
     def idle(self) -> bool:
         """Whether every step was played."""
-        return not self._steps and not self._in_flight
+        return self.player.finished and not self._in_flight
 
     # -- listening -------------------------------------------------------------------------
 
@@ -86,8 +84,10 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
             return
         samples, columns = samples_from_message(message)
         self.time = float(samples[-1, columns.index('time')])
-        if self._steps and not self._in_flight and self._is_due(self._steps[0]):
-            self._play(self._steps.pop(0))
+        if not self._in_flight:
+            step = self.player.due(self.time, self._estimates['recommended_speed_rpm'])
+            if step is not None:
+                self._play(step)
 
     def _on_state(self, message: String) -> None:
         self.state = message.data
@@ -99,56 +99,32 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         return take
 
     def _on_flag(self, message: Bool) -> None:
-        if message.data:
-            self.said.append(FLAGGED)
-            known = self._estimates
-            self._tell(
-                f'{self.time:7.2f} s  chatter flagged: {known["frequency"]:.1f} Hz, '
-                f'growth {known["growth_rate"]:+.1f} 1/s'
-            )
-        elif FLAGGED in self.said:
-            self.said.append(CLEARED)
-            self._tell(f'{self.time:7.2f} s  flag cleared: the cut is stable')
-        self._heard_at = self.time
+        known = self._estimates
+        what = self.player.hear_flag(
+            self.time, known['frequency'], known['growth_rate'], up=message.data
+        )
+        if what:
+            self._tell(f'{self.time:7.2f} s  {what}')
 
     # -- acting ----------------------------------------------------------------------------
 
-    def _is_due(self, step: Step) -> bool:
-        """Whether a step's time has come, or what it waits for has been said long enough."""
-        if step.at is not None:
-            return self.time >= step.at
-        if step.when not in self.said[self._heard_before_step :]:
-            return False
-        wanted = RECOMMENDED in step.changes.values()
-        if wanted and not math.isfinite(self._estimates['recommended_speed_rpm']):
-            return False
-        return self.time >= self._heard_at + step.after
-
     def _play(self, step: Step) -> None:
-        changes = {name: self._resolved(value) for name, value in step.changes.items()}
-        shown = ', '.join(f'{name} = {value}' for name, value in changes.items())
-        self._tell(f'{self.time:7.2f} s  {shown}{step.because and f"  ({step.because})"}')
+        self._tell(f'{self.time:7.2f} s  {step}')
         request = SetParametersAtomically.Request(
             parameters=[
-                Parameter(name, value=value).to_parameter_msg() for name, value in changes.items()
+                Parameter(name, value=value).to_parameter_msg()
+                for name, value in step.changes.items()
             ]
         )
         self._in_flight = True
-        self._heard_before_step = len(self.said)
         future = self._client.call_async(request)
-        future.add_done_callback(lambda done: self._on_answer(shown, done))
+        future.add_done_callback(lambda done: self._on_answer(step, done))
 
-    def _resolved(self, value: Any) -> Any:
-        """The speed that the monitor recommends, rounded to what a machinist would set."""
-        if value == RECOMMENDED:
-            return float(round(self._estimates['recommended_speed_rpm']))
-        return value
-
-    def _on_answer(self, shown: str, future: Any) -> None:
+    def _on_answer(self, step: Step, future: Any) -> None:
         self._in_flight = False
         result = future.result().result
         if not result.successful:
-            self.failure = ScenarioFailedError(f'The lathe refused {shown}: {result.reason}')
+            self.failure = ScenarioFailedError(f'The lathe refused {step}: {result.reason}')
 
 
 def parameter_arguments(parameters: Mapping[str, Any]) -> list[str]:

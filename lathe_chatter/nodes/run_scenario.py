@@ -192,6 +192,6 @@ def _finished(operator: Operator, scenario: Scenario) -> bool:
     if operator.time < scenario.duration:
         return False
     pending = not operator.idle or any(
-        expected and word not in operator.said for word, expected in scenario.expect.items()
+        expected and word not in operator.player.said for word, expected in scenario.expect.items()
     )
     return not pending or operator.time >= scenario.duration + _GRACE

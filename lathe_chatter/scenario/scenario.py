@@ -44,6 +44,11 @@ class Step:
     after: float = 0.0
     because: str = ''
 
+    def __str__(self) -> str:
+        """What changes and why, in a line."""
+        shown = ', '.join(f'{name} = {value}' for name, value in self.changes.items())
+        return f'{shown}{self.because and f"  ({self.because})"}'
+
 
 @dataclass(frozen=True)
 class Scenario:

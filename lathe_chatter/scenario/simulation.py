@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
@@ -19,7 +18,8 @@ from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, kn
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.samples import SAMPLE_COLUMNS
-from lathe_chatter.scenario import CLEARED, FLAGGED, RECOMMENDED, Scenario, Step
+from lathe_chatter.scenario.player import ScenarioPlayer
+from lathe_chatter.scenario.scenario import CLEARED, FLAGGED, Scenario, Step
 
 _BLOCK, _WATCHED_BLOCK = 0.05, 0.01
 """s of samples in one message, without a monitor and with one."""
@@ -85,22 +85,23 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
     lathe = config.lathe()
     with LatheRun(folder, config.parameters(), simulated=True) as run:
         run.tell(BEGINNING)
-        player = _Player(lathe, run, scenario, knocks, tell)
+        simulation = _Simulation(lathe, run, scenario, knocks, tell)
         if monitor:
-            player.watch(ChatterDetector(config.machine))
-        while player.play_block():
+            simulation.watch(ChatterDetector(config.machine))
+        while simulation.play_block():
             progress(lathe.time)
+    said = simulation.player.said
     return Simulated(
         folder,
         lathe.samples_taken,
         lathe.time,
-        FLAGGED in player.said if monitor else None,
-        player.said[-1:] == [CLEARED] if monitor else None,
+        FLAGGED in said if monitor else None,
+        said[-1:] == [CLEARED] if monitor else None,
         lathe.guard,
     )
 
 
-class _Player:
+class _Simulation:
     """One scenario on one lathe."""
 
     def __init__(
@@ -111,12 +112,10 @@ class _Player:
         knocks: Sequence[Knock],
         tell: Tell,
     ) -> None:
-        self.said: list[str] = []
+        self.player = ScenarioPlayer(scenario)
         self._lathe, self._run, self._tell = lathe, run, tell
-        self._end = round(scenario.duration * lathe.sample_rate)
-        self._steps = list(scenario.steps)
+        self._end = self._sample_of(scenario.duration)
         self._knocks = sorted(knocks, key=lambda knock: knock.time)
-        self._heard_before_step, self._heard_at = 0, 0.0
         self._detector: ChatterDetector | None = None
         self._estimate = Estimate()
         self._next_report = 0.0
@@ -130,8 +129,8 @@ class _Player:
     def play_block(self) -> bool:
         """Do what is due and cut on for a block; whether there is more to do."""
         now = self._lathe.samples_taken
-        while self._steps and self._is_due(self._steps[0]):
-            self._play(self._steps.pop(0))
+        while step := self._due():
+            self._play(step)
         while self._knocks and self._sample_of(self._knocks[0].time) <= now:
             self._knock(self._knocks.pop(0).impulse)
         if now >= self._end:
@@ -151,45 +150,27 @@ class _Player:
         """The sample at which the block ends: at once a block's length or the next event."""
         length = _BLOCK if self._detector is None else _WATCHED_BLOCK
         now = self._lathe.samples_taken
-        stops = [self._end, now + max(round(length * self._lathe.sample_rate), 1)]
-        stops += [self._sample_of(knock.time) for knock in self._knocks[:1]]
-        if self._steps and self._steps[0].at is not None:
-            stops.append(self._sample_of(self._steps[0].at))
+        times = [knock.time for knock in self._knocks[:1]]
+        if math.isfinite(self.player.next_time):
+            times.append(self.player.next_time)
+        stops = [self._end, now + max(self._sample_of(length), 1), *map(self._sample_of, times)]
         return max(min(stops), now + 1)
 
     # -- acting ----------------------------------------------------------------------------
 
-    def _is_due(self, step: Step) -> bool:
-        """Whether a step's time has come, or what it waits for has been said long enough."""
-        if step.at is not None:
-            return self._lathe.samples_taken >= self._sample_of(step.at)
-        if step.when not in self.said[self._heard_before_step :]:
-            return False
-        wanted = RECOMMENDED in step.changes.values()
-        if wanted and not math.isfinite(self._estimate.recommended_speed_rpm):
-            return False
-        return self._lathe.time >= self._heard_at + step.after
+    def _due(self) -> Step | None:
+        """The next step, if its time is nearer to this sample than to the next."""
+        time = self._lathe.time + 0.5 / self._lathe.sample_rate
+        return self.player.due(time, self._estimate.recommended_speed_rpm)
 
     def _play(self, step: Step) -> None:
-        changes = {
-            name: self._resolved(value)
-            for name, value in step.changes.items()
-            if name not in LATHE or not LATHE[name].node_only
-        }
-        cut = self._lathe.cut.with_changes(**changes)
+        meant = {n: v for n, v in step.changes.items() if n not in LATHE or not LATHE[n].node_only}
+        cut = self._lathe.cut.with_changes(**meant)
         sentence = change_sentence(self._lathe.time, self._lathe.cut, cut)
         self._lathe.retune(cut)
         if sentence:
             self._run.tell(sentence)
-        shown = ', '.join(f'{name} = {value}' for name, value in changes.items())
-        self._tell(self._lathe.time, f'{shown}{step.because and f"  ({step.because})"}')
-        self._heard_before_step = len(self.said)
-
-    def _resolved(self, value: Any) -> Any:
-        """The speed that the monitor recommends, rounded to what a machinist would set."""
-        if value == RECOMMENDED:
-            return float(round(self._estimate.recommended_speed_rpm))
-        return value
+        self._tell(self._lathe.time, str(replace(step, changes=meant)))
 
     def _knock(self, impulse: float) -> None:
         self._run.tell(knock_sentence(self._lathe.time, impulse))
@@ -211,16 +192,11 @@ class _Player:
         if estimate.state != self._state:
             self._state = estimate.state
             self._run.publish(f'{_MONITOR}/state', 'std_msgs/msg/String', data=self._state)
-        if estimate.chatter == self._flag:
-            return
-        self._flag = estimate.chatter
-        self._run.publish(f'{_MONITOR}/chatter', 'std_msgs/msg/Bool', data=self._flag)
-        self.said.append(FLAGGED if self._flag else CLEARED)
-        self._heard_at = self._lathe.time
-        what = 'flag cleared: the cut is stable'
-        if self._flag:
-            what = (
-                f'chatter flagged: {estimate.frequency:.1f} Hz, '
-                f'growth {estimate.growth_rate:+.1f} 1/s'
-            )
-        self._tell(self._lathe.time, what)
+        if estimate.chatter != self._flag:
+            self._flag = estimate.chatter
+            self._run.publish(f'{_MONITOR}/chatter', 'std_msgs/msg/Bool', data=self._flag)
+        what = self.player.hear_flag(
+            self._lathe.time, estimate.frequency, estimate.growth_rate, up=estimate.chatter
+        )
+        if what:
+            self._tell(self._lathe.time, what)

@@ -69,7 +69,7 @@ def test_a_scenario_whose_expectation_fails_is_exit_1(
         (['--knock', '3'], "--knock is '3'"),
         (['--knock=-1:0.1'], '--knock is -1.0 s'),
         (['--knock', '5:0.1', '--duration', '1'], '--knock is 5.0 s: it must be a finite number'),
-        (['--depth-of-cut', '1'], 'depth_of_cut is 1.0 m'),
+        (['--depth-of-cut', '1'], 'depth_of_cut is 1 m'),
         (['--scenario', 'nothing'], 'There is no scenario'),
         (['--bearing-contact', 'gap', '--seed', '1.5'], 'seed is 1.5'),
     ],
