@@ -13,7 +13,7 @@ from std_msgs.msg import Float64MultiArray
 
 from lathe_chatter.nodes.messages import BlockReader, samples_from_message
 from lathe_chatter.nodes.node_main import make_executor
-from lathe_chatter.nodes.polled_subscription import Drained
+from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.samples.continuity import Continuity
 
 DEEP = QoSProfile(depth=5000)
@@ -41,7 +41,7 @@ class Ear:
 
         At ten thousand blocks a second a callback for each is too slow.
         """
-        samples = Drained(self.node, Float64MultiArray, '/lathe/samples', _DEEPEST)
+        samples = PolledSubscription(self.node, Float64MultiArray, '/lathe/samples', _DEEPEST)
         reader = BlockReader()
         while (self.heard.last or 0.0) < until:
             for serialised, _info in samples.take():

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from lathe_chatter.cli.console import tell_verdict
 from lathe_chatter.cli.report import show_run
-from lathe_chatter.nodes.deferred_signals import HeldSignals
+from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.process_group import RunFailedError
 from lathe_chatter.precompile import precompile
 from lathe_chatter.recording import read_run
@@ -95,7 +95,7 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
         RunFailedError: If there is no ROS 2 here, or the run fails.
     """
     try:
-        with HeldSignals():  # an import cut short would look like a ROS 2 that is not there
+        with DeferredSignals():  # an import cut short would look like a ROS 2 that is not there
             from lathe_chatter.nodes.run_scenario import play
     except ImportError as error:
         raise RunFailedError(

@@ -1,4 +1,4 @@
-"""Run, pause, step and reset, as a state machine that knows nothing of ROS.
+"""Run, pause, step and reset: a state machine, and the services that drive it.
 
           pause           step (one tick)
 RUNNING ---------> PAUSED ---------------> PAUSED
@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
+
+from std_srvs.srv import SetBool, Trigger
 
 
 class RunState(str, Enum):
@@ -103,3 +105,23 @@ class Simulator(Protocol):
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
         """Create a service."""
+
+
+def create_services(simulator: Simulator) -> None:
+    """Create `~/pause`, `~/step` and `~/reset`, in std_srvs: what every graph has."""
+
+    def pause(request: Any, response: Any) -> Any:
+        response.success, response.message = simulator.pause(pause=request.data)
+        return response
+
+    def step(_request: Any, response: Any) -> Any:
+        response.success, response.message = simulator.step()
+        return response
+
+    def reset(_request: Any, response: Any) -> Any:
+        response.success, response.message = simulator.reset()
+        return response
+
+    simulator.create_service(SetBool, '~/pause', pause)
+    simulator.create_service(Trigger, '~/step', step)
+    simulator.create_service(Trigger, '~/reset', reset)

@@ -1,15 +1,39 @@
-"""Wishes to end (Ctrl-C, SIGTERM, SIGHUP) held back to where a loop can heed them."""
+"""Signals to end (Ctrl-C, SIGTERM, SIGHUP): raised at once, or held back for a while."""
 
 from __future__ import annotations
 
 import signal
 from types import FrameType, TracebackType
 
-_WISHES = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-class HeldSignals:
-    """As a context: the signals are noted, and `heed` hands them to the handlers of before.
+def raise_on_end_signals() -> list[int]:
+    """From now on each of them raises KeyboardInterrupt; one that is ignored, as under nohup, not.
+
+    Returns:
+        The numbers of those that came, as they come.
+    """
+    came: list[int] = []
+
+    def interrupt(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    for number in END_SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, interrupt)
+    return came
+
+
+def ignore_end_signals() -> None:
+    """From now on none of them does anything: what they ask for is under way."""
+    for number in END_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+class DeferredSignals:
+    """As a context: the signals are noted, and `deliver` hands them to the handlers of before.
 
     Those raise KeyboardInterrupt. Raised amid a call into C++, as the executor of rclpy makes
     many, it can come out as another error altogether, or be lost.
@@ -20,7 +44,11 @@ class HeldSignals:
         self._number: int | None = None
         self._before: dict[int, signal._HANDLER] = {}
 
-    def heed(self) -> None:
+    def came(self) -> bool:
+        """Whether one was noted that is not delivered yet."""
+        return self._number is not None
+
+    def deliver(self) -> None:
         """Let the first signal that came do what it would have done.
 
         Raises:
@@ -37,12 +65,12 @@ class HeldSignals:
         if self._number is None:
             self._number = number
 
-    def __enter__(self) -> HeldSignals:  # noqa: PYI034 -- Self needs Python 3.11
+    def __enter__(self) -> DeferredSignals:  # noqa: PYI034 -- Self needs Python 3.11
         """Begin to hold."""
-        for wish in _WISHES:
-            before = signal.getsignal(wish)
-            if callable(before):  # one that is ignored, as under nohup, stays so
-                self._before[wish] = signal.signal(wish, self._note)
+        for number in END_SIGNALS:
+            before = signal.getsignal(number)
+            if callable(before):  # one that is ignored stays so
+                self._before[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(
@@ -51,8 +79,8 @@ class HeldSignals:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put the handlers back; what nobody heeded is heeded now, unless an error goes on."""
-        for wish, before in self._before.items():
-            signal.signal(wish, before)
+        """Put the handlers back; what was not delivered is now, unless an error goes on."""
+        for number, before in self._before.items():
+            signal.signal(number, before)
         if kind is None:
-            self.heed()
+            self.deliver()

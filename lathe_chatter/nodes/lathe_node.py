@@ -15,18 +15,22 @@ from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.model import Cut
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
-from lathe_chatter.nodes import control_services, simulation_services
+from lathe_chatter.nodes import control, simulation_services
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.lathe_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.pacing import SECOND, Pacer
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.scheduling import RealTime, ask_for_short_slices
-from lathe_chatter.nodes.tick_loop import spin_in_ticks
-from lathe_chatter.nodes.tick_statistics import LatheMeter
+from lathe_chatter.nodes.real_time import (
+    SECOND,
+    Pacer,
+    RealTime,
+    ask_for_short_slices,
+    spin_in_ticks,
+)
+from lathe_chatter.nodes.tick_statistics import TickStatistics
 from lathe_chatter.precompile import precompile
 
 _BUDGET = 5_000_000
@@ -49,7 +53,7 @@ class LatheNode(ParameterNode):
 
     Args:
         by_timer: Whether a timer wakes it, so that any executor will do; else its loop calls
-            `wake` (tick_loop.py). Under `use_sim_time` there is a timer in any case.
+            `wake` (`real_time.spin_in_ticks`). Under `use_sim_time` there is a timer in any case.
         options: As for `rclpy.node.Node`.
 
     Raises:
@@ -82,12 +86,12 @@ class LatheNode(ParameterNode):
         tick = SECOND / values['tick_rate']
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
-        self._meter = LatheMeter(self._pacer, tick)
+        self._meter = TickStatistics(self._pacer, tick)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
-        control_services.offer(self)
+        control.create_services(self)
         if simulation_services.AVAILABLE:
-            simulation_services.offer(self)
+            simulation_services.create_services(self)
         self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=10))
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._by_timer = by_timer or self._follows
@@ -163,7 +167,7 @@ class LatheNode(ParameterNode):
             )
             self._diagnostics.publish_changes(self._statuses())
 
-    def keep_place(self) -> None:
+    def update_scheduling(self) -> None:
         """Be scheduled in real time only while that disturbs nobody: with cores to spare."""
         running = self._control.state is RunState.RUNNING and not self._free
         self._real_time.hold(wanted=running and self._factor <= 1.0 and not self._meter.behind)
@@ -243,7 +247,7 @@ class LatheNode(ParameterNode):
         answer = self._control.pause(pause=pause)
         if self._control.state is not before:
             self._start_clock()
-        return self._told(answer)
+        return self._reported(answer)
 
     def step(self, ticks: int = 1) -> Answer:
         """Make ticks by hand, while paused; fewer if the guard trips."""
@@ -252,7 +256,7 @@ class LatheNode(ParameterNode):
             for _ in range(ticks):
                 self._tick()
             answer = Answer(done=True, message=f'Now at {self._lathe.time:.6f} s.')
-        return self._told(answer)
+        return self._reported(answer)
 
     def reset(self) -> Answer:
         """Start again at time zero with the present parameters: the same run, bit for bit."""
@@ -262,9 +266,9 @@ class LatheNode(ParameterNode):
         self._record.restarted(before.time, before.cut, self._lathe.cut)
         self._start_clock()
         self.get_logger().info(answer.message)
-        return self._told(answer)
+        return self._reported(answer)
 
-    def _told(self, answer: Answer) -> Answer:
+    def _reported(self, answer: Answer) -> Answer:
         self._diagnostics.publish_changes(self._statuses())
         return answer
 

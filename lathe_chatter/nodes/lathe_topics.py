@@ -15,7 +15,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.nodes.messages import Wire, joint_states, time_message
-from lathe_chatter.nodes.overrides import publisher_overrides
+from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _SCALARS = {
@@ -26,7 +26,7 @@ _SCALARS = {
 }
 _HISTORY = 4.0
 """Seconds, by the clock on the wall, that a reader may fall behind before it misses a tick."""
-_MOST = 10_000
+MAX_HISTORY = 10_000
 """Ticks that are kept at most, where they come faster than in real time."""
 _LOOK_AROUND = 0.01
 """s after which a new listener is noticed."""
@@ -56,8 +56,8 @@ class LatheTopics:
             return node.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
         in_real_time = max(10, round(_HISTORY * tick_rate))
-        faster = round(in_real_time * factor) if factor else _MOST
-        deep = max(in_real_time, min(faster, _MOST))
+        faster = round(in_real_time * factor) if factor else MAX_HISTORY
+        deep = max(in_real_time, min(faster, MAX_HISTORY))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._samples = publisher(Float64MultiArray, '~/samples', kept)
         self._wire = Wire()

@@ -21,12 +21,12 @@ from lathe_chatter.model.parameters import machine_from
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.monitor_sentences import clearance, details, onset
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.overrides import publisher_overrides
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR, ModelSource
-from lathe_chatter.nodes.remote_machine import AskedMachine
+from lathe_chatter.nodes.qos_overrides import publisher_overrides
+from lathe_chatter.nodes.real_time import spin_in_ticks
+from lathe_chatter.nodes.remote_parameters import RemoteMachine
 from lathe_chatter.nodes.sample_stream import Fed, SampleFeed
-from lathe_chatter.nodes.tick_loop import spin_in_ticks
 from lathe_chatter.precompile import precompile
 from lathe_chatter.samples.continuity import Continuity, Joint, times_of
 
@@ -53,7 +53,7 @@ class MonitorNode(ParameterNode):
 
     Args:
         by_timer: Whether a timer lets it look at the samples, so that any executor will do; else
-            its loop calls `wake` (tick_loop.py).
+            its loop calls `wake` (`real_time.spin_in_ticks`).
         options: As for `rclpy.node.Node`.
 
     Raises:
@@ -68,9 +68,9 @@ class MonitorNode(ParameterNode):
         self.machine: Machine | None = None
         if source is ModelSource.PARAMETERS:
             self.machine = machine_from(self.values)
-        self._asked: AskedMachine | None = None
+        self._asked: RemoteMachine | None = None
         if source is ModelSource.LATHE:
-            self._asked = AskedMachine(self, self._learn)
+            self._asked = RemoteMachine(self, self._learn)
         self._detector = self._new_detector()
         self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
@@ -102,7 +102,7 @@ class MonitorNode(ParameterNode):
         """When it looks at its samples next, ns of time.monotonic_ns()."""
         return self._wake_at
 
-    def keep_place(self) -> None:
+    def update_scheduling(self) -> None:
         """It needs no place of its own in the scheduling: late is not wrong."""
 
     def wake(self) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import signal
+import ctypes
 import sys
 import time
 from collections.abc import Callable
-from types import FrameType
 from typing import TypeVar
 
 import rclpy
@@ -23,8 +22,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.exit_watchdog import end_within
+from lathe_chatter.nodes.deferred_signals import (
+    DeferredSignals,
+    ignore_end_signals,
+    raise_on_end_signals,
+)
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.real_time import LOOK_UP
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor
@@ -35,18 +39,18 @@ _Node = TypeVar('_Node', bound=ParameterNode)
 Spin = Callable[[Executor, _Node, Callable[[], bool]], None]
 """Serves a node with an executor until a function says that it is told to end."""
 
-LOOK_UP = 0.1
-"""s after which a node that nothing happens to looks whether it was told to end."""
-
-_DELIVERY = 2.0
+_DELIVERY_TIMEOUT = 2.0
 """s that the readers of a node have, at its end, to take what was published last."""
 
-_QUIET = 0.2
+_DISCOVERY_SETTLE = 0.2
 """s in which a finished node hears of others that ended just before it: Fast DDS may crash where a
 participant goes meanwhile."""
-_LETTING_GO = 5.0
+_SHUTDOWN_TIMEOUT = 5.0
 """s that the middleware has to let go of a node that has finished."""
 
+_BY_THREAD = 2  # SIGEV_THREAD of sigevent(3type): the timer calls a function
+_CLOCK_MONOTONIC = 1
+_TIMER_FUNCTIONS = ('timer_create', 'timer_settime', '_exit')
 _START_ERRORS = (
     LatheChatterError,
     InvalidQosOverridesError,
@@ -59,29 +63,6 @@ _START_ERRORS = (
 
 class StartError(LatheChatterError):
     """A command line that a node does not understand."""
-
-
-class _EndSignal:
-    """SIGINT and SIGTERM: an exception while the node is made, a flag once it runs.
-
-    rclpy's own handlers shut the context down under a callback that is publishing, and a node
-    could say nothing more at its end.
-    """
-
-    def __init__(self) -> None:
-        self.came = False
-        self._running = False
-        signal.signal(signal.SIGINT, self)
-        signal.signal(signal.SIGTERM, self)
-
-    def __call__(self, _number: int, _frame: FrameType | None) -> None:
-        self.came = True
-        if not self._running:
-            raise KeyboardInterrupt
-
-    def wait(self) -> None:
-        """From now on, only note the signal."""
-        self._running = True
 
 
 def run_node(
@@ -108,35 +89,34 @@ def run_node(
         SystemExit: With 0 after `--help`; with 2 and a sentence on stderr if the node cannot
             start as it was asked to.
     """
-    end = _EndSignal()
+    came = raise_on_end_signals()
     node: _Node | None = None
     begun = False
     try:
-        _take_no_words(sys.argv if args is None else ['', *args], usage)
+        _refuse_words(sys.argv if args is None else ['', *args], usage)
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
-        end.wait()
-        node.begin()
-        begun = True
-        executor = make_executor(node, by_events=by_events)
-        if spin is not None:
-            spin(executor, node, lambda: end.came)
-        else:
-            serve(executor, node, lambda: end.came)
+        # rclpy's own handlers would shut the context down under a callback that is publishing,
+        # and the node could say nothing more at its end.
+        with DeferredSignals() as signals:
+            node.begin()
+            begun = True
+            (spin or serve)(make_executor(node, by_events=by_events), node, signals.came)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except _START_ERRORS as error:
         if begun:
             raise
-        if end.came:  # the interrupt, raised amid a call into C++, came out as another error
+        if came:  # the interrupt, raised amid a call into C++, came out as another error
             return
         sys.stderr.write(f'{error}\n')
         raise SystemExit(2) from None
     finally:
+        ignore_end_signals()
         _finish(node)
 
 
-def _take_no_words(args: list[str], usage: str) -> None:
+def _refuse_words(args: list[str], usage: str) -> None:
     """Answer `--help`, and refuse any other word: what is ignored would be taken for heard.
 
     Raises:
@@ -163,10 +143,10 @@ def _finish(node: ParameterNode | None) -> None:
             finally:
                 node.finish()
     finally:
-        end_within(_LETTING_GO, _exit_code())
+        exit_within(_SHUTDOWN_TIMEOUT, _exit_code())
         try:
             if node is not None:
-                time.sleep(_QUIET)
+                time.sleep(_DISCOVERY_SETTLE)
                 node.destroy_node()
         finally:
             rclpy.try_shutdown()
@@ -182,7 +162,7 @@ def _exit_code() -> int:
 
 def _deliver(node: Node) -> None:
     """Wait until readers have what was published: with its publishers a node's history goes."""
-    until = time.monotonic() + _DELIVERY
+    until = time.monotonic() + _DELIVERY_TIMEOUT
     for publisher in node.publishers:
         left = max(until - time.monotonic(), 0.0)
         publisher.wait_for_all_acked(Duration(seconds=left))
@@ -214,3 +194,56 @@ def make_executor(node: Node, *, by_events: bool = True) -> Executor:
     """
     kind = EventsExecutor if by_events and EventsExecutor is not None else SingleThreadedExecutor
     return kind(context=node.context)
+
+
+class _TimerEvent(ctypes.Structure):
+    """`struct sigevent` of Linux: 64 bytes."""
+
+    _fields_ = (
+        ('value', ctypes.c_long),
+        ('signal', ctypes.c_int),
+        ('notify', ctypes.c_int),
+        ('function', ctypes.c_void_p),
+        ('attributes', ctypes.c_void_p),
+        ('rest', ctypes.c_char * 32),
+    )
+
+
+class _TimerPeriod(ctypes.Structure):
+    """`struct itimerspec`: first the period, 0 for none, then the time until it is due."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_long) for name in ('period_s', 'period_ns', 'seconds', 'nanoseconds')
+    )
+
+
+def exit_within(seconds: float, code: int) -> None:
+    """End this process with an exit code if it has not ended by itself.
+
+    Fast DDS 2.14, that of Jazzy, can wait for itself for ever where a participant is destroyed
+    while another one is being discovered: `set_listener` waits, with a lock held, for a callback
+    to return that waits for the lock. rclpy holds the GIL meanwhile, so neither a thread of
+    Python nor a handler of signals can end the process; a timer of the C library can.
+
+    Everything that has to be kept must be on disk. Where the C library has no such timer nothing
+    is done.
+
+    Args:
+        seconds: That it has, more than 0.
+        code: Its exit code.
+    """
+    if sys.platform != 'linux':
+        return
+    library = ctypes.CDLL(None)
+    try:
+        make, start, leave = (library[name] for name in _TIMER_FUNCTIONS)
+    except AttributeError:  # glibc before 2.34 has them in another library
+        return
+    event = _TimerEvent(
+        value=code, notify=_BY_THREAD, function=ctypes.cast(leave, ctypes.c_void_p).value
+    )
+    timer = ctypes.c_void_p()
+    if make(_CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)) == 0:
+        whole, rest = divmod(seconds, 1.0)
+        times = _TimerPeriod(seconds=int(whole), nanoseconds=int(1e9 * rest))
+        start(timer, 0, ctypes.byref(times), None)

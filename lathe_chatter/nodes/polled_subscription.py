@@ -28,7 +28,7 @@ class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type inf
         return
 
 
-class Drained:
+class PolledSubscription:
     """The serialised messages of a topic, when they are asked for.
 
     Args:

@@ -13,7 +13,7 @@ from typing import IO, NamedTuple
 
 from lathe_chatter.errors import LatheChatterError
 
-_PATIENCE = 15.0
+_END_TIMEOUT = 15.0
 """s that a node has to finish what it does after SIGINT."""
 _ENDED_WELL = (0, -signal.SIGINT)
 """The latter of a node that was told to end while it was still being imported."""
@@ -40,7 +40,7 @@ def _die_with_parent() -> None:
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGTERM)
 
 
-class Cell:
+class ProcessGroup:
     """Processes of nodes; as a context it ends them all, the last started last.
 
     They are in sessions of their own, so that Ctrl-C reaches this process alone, which then
@@ -89,18 +89,20 @@ class Cell:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
             try:
-                process.wait(_PATIENCE)
+                process.wait(_END_TIMEOUT)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-                complaints.append(f'{name} did not end within {_PATIENCE:.0f} s and was killed.')
+                complaints.append(
+                    f'{name} did not end within {_END_TIMEOUT:.0f} s and was killed.'
+                )
             else:
                 if process.returncode not in _ENDED_WELL and not _interrupted(output):
                     complaints.append(_last_words(name, process.returncode, output))
             output.close()
         return complaints
 
-    def __enter__(self) -> Cell:  # noqa: PYI034 -- Self needs Python 3.11
+    def __enter__(self) -> ProcessGroup:  # noqa: PYI034 -- Self needs Python 3.11
         """Nothing runs yet."""
         return self
 

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from lathe_chatter.nodes.polled_subscription import Drained
+from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.recording import Topic
 from lathe_chatter.recording.sequence_gaps import Numbering
 
@@ -82,7 +82,7 @@ class RecordedTopic:
 
     def _subscribe(self, qos: QoSProfile) -> None:
         self._qos = qos
-        self._subscription = Drained(self._node, self._class, self.topic.name, qos)
+        self._subscription = PolledSubscription(self._node, self._class, self.topic.name, qos)
 
     def drain(self) -> None:
         """Take everything that has arrived."""

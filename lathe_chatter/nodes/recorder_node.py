@@ -20,7 +20,7 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import RECORDER
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
 from lathe_chatter.nodes.recording_status import news, recording_status
-from lathe_chatter.nodes.remote_parameters import ParameterSnapshots
+from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.topic_watch import TopicWatch
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.cut_session import Journal
@@ -140,7 +140,7 @@ class RecorderNode(ParameterNode):
         self._watch = TopicWatch(self, values['topics'], self._writer, self._write)
         self._journal, self._stalls = Journal(), Stalls()
         self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
-        self._snapshots = ParameterSnapshots(self, self._note_parameters)
+        self._snapshots = RemoteParameters(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
         self._writer.note(IDENTITY, {**identity(), 'middleware': middleware})
         for name in values['attachments']:

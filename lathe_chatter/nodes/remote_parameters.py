@@ -3,85 +3,155 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
+
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.model import Machine
+from lathe_chatter.model.parameters import MACHINE_ROWS, machine_from
 
 _SETTLING = 1.0
 """s from when this node has found the services of another to when the other has found it too: an
 answer to a client that it does not know yet would hold the other up."""
-
 _UNKNOWN = '_UNKNOWN_'
 """In the name of a node of which the graph has a publisher before it has the name."""
 _PATIENCE = 1.0
 """s after which an unanswered node is asked again: on a busy machine answers may be lost."""
+_MACHINE = [row.name for row in MACHINE_ROWS]
 
-Tell = Callable[[str, dict[str, Any]], None]
-"""Takes the full name of a node and its parameters."""
+Answer = Callable[[str, dict[str, Any]], None]
+"""Takes the name of a node and its parameters; one that it does not have is None."""
 
 
-class ParameterSnapshots:
-    """Asks each wanted node, once it answers.
+class RemoteParameters:
+    """Asks each wanted node, once it can answer.
 
     Args:
         node: In whose name.
-        tell: What to do with an answer; called by the executor.
+        on_answer: What to do with an answer; called by the executor.
     """
 
-    def __init__(self, node: Node, tell: Tell) -> None:
+    def __init__(self, node: Node, on_answer: Answer) -> None:
         """Begin with nothing wanted."""
         self._node = node
-        self._tell = tell
-        self._wanted: dict[str, tuple[Client, Client]] = {}
-        self._due: dict[str, float] = {}
-        self._known: set[str] = set()
+        self._on_answer = on_answer
+        self._questions: dict[str, _Question] = {}
+        self._answered: set[str] = set()
 
     def want(self, namespace: str, node_name: str) -> None:
-        """Ask a node for its parameters, once the graph knows its name; again is not asked."""
-        if _UNKNOWN in node_name:
-            return
+        """Ask a node for all its parameters, once the graph knows its name; but only once."""
         name = f'{namespace.rstrip("/")}/{node_name}'  # a namespace is / or ends without one
-        if name in self._known or name == self._node.get_fully_qualified_name():
-            return
-        self._known.add(name)
-        self._wanted[name] = (
-            self._node.create_client(ListParameters, f'{name}/list_parameters'),
-            self._node.create_client(GetParameters, f'{name}/get_parameters'),
-        )
+        if _UNKNOWN not in node_name and name != self._node.get_fully_qualified_name():
+            self.ask(name)
+
+    def ask(self, name: str, parameters: Sequence[str] | None = None) -> None:
+        """Ask a node for some parameters, or for all, unless it is asked or has answered.
+
+        Args:
+            name: Full, or relative to the namespace of this node and remappable.
+            parameters: Their names; None for all that it has.
+        """
+        if name not in self._questions and name not in self._answered:
+            self._questions[name] = _Question(self._node, name, parameters)
 
     def want_again(self, name: str) -> None:
-        """Ask a node, by its full name, once more: another of its name has been started."""
-        if name not in self._wanted:
-            self._known.discard(name)
+        """Ask a node that has answered once more: another of its name has been started."""
+        self._answered.discard(name)
 
     def look(self) -> None:
         """Ask those that can answer by now, and have not."""
+        for name, question in self._questions.items():
+            question.look(partial(self._take, name))
+
+    def _take(self, name: str, values: dict[str, Any]) -> None:
+        if (question := self._questions.pop(name, None)) is not None:
+            question.close()
+            self._answered.add(name)
+            self._on_answer(name, values)
+
+
+class _Question:
+    """What one node is asked."""
+
+    def __init__(self, node: Node, name: str, parameters: Sequence[str] | None) -> None:
+        self._node = node
+        self._names = parameters
+        self._get = node.create_client(GetParameters, f'{name}/get_parameters')
+        self._list = node.create_client(ListParameters, f'{name}/list_parameters')
+        self._due: float | None = None
+
+    def look(self, on_values: Callable[[dict[str, Any]], None]) -> None:
+        """Ask, if it is time to."""
         now = time.monotonic()
-        for name, clients in list(self._wanted.items()):
-            if not all(client.service_is_ready() for client in clients):
-                self._due.pop(name, None)
-            elif now > self._due.setdefault(name, now + _SETTLING):
-                self._due[name] = now + _PATIENCE
-                self._list(name, *clients)
+        if not (self._get.service_is_ready() and self._list.service_is_ready()):
+            self._due = None
+        elif self._due is None:
+            self._due = now + _SETTLING
+        elif now > self._due:
+            self._due = now + _PATIENCE
+            self._ask(on_values)
 
-    def _list(self, name: str, lister: Client, getter: Client) -> None:
-        def got(future: Any) -> None:
-            if name not in self._wanted:  # answered meanwhile
+    def _ask(self, on_values: Callable[[dict[str, Any]], None]) -> None:
+        def get(names: Sequence[str]) -> None:
+            def got(future: Any) -> None:
+                found = map(parameter_value_to_python, future.result().values)
+                on_values(dict(zip(names, found, strict=False)))
+
+            self._get.call_async(GetParameters.Request(names=names)).add_done_callback(got)
+
+        if self._names is not None:
+            get(self._names)
+            return
+        listed = self._list.call_async(ListParameters.Request())
+        listed.add_done_callback(lambda future: get(list(future.result().result.names)))
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._node.destroy_client(self._get)
+        self._node.destroy_client(self._list)
+
+
+class RemoteMachine:
+    """Asks for the machine that a lathe says it is, without waiting for it.
+
+    Args:
+        node: That asks; the lathe is the node `lathe` beside it, remappable like its topics.
+        on_machine: Called with the machine.
+    """
+
+    def __init__(self, node: Node, on_machine: Callable[[Machine], None]) -> None:
+        """Nothing is asked yet."""
+        self._node, self._on_machine = node, on_machine
+        self._parameters = RemoteParameters(node, self._take)
+        self.answered = False
+
+    def ask(self) -> None:
+        """Ask, if there is somebody to ask; called again and again until it is answered."""
+        self.answered = False
+        self._parameters.want_again('lathe')
+        self._parameters.ask('lathe', _MACHINE)
+        self._parameters.look()
+
+    def _take(self, _name: str, values: dict[str, Any]) -> None:
+        doubles = {name: value for name, value in values.items() if isinstance(value, float)}
+        lacking = [name for name in _MACHINE if name not in doubles]
+        try:
+            machine = machine_from(doubles)
+        except ParameterError as error:
+            self._complain(str(error))
+        else:
+            if lacking:
+                self._complain(f'it has no parameter {lacking[0]}.')
                 return
-            names = list(future.result().result.names)
-            request = GetParameters.Request(names=names)
-            getter.call_async(request).add_done_callback(lambda f: values(f, names))
+            self.answered = True
+            self._on_machine(machine)
 
-        def values(future: Any, names: list[str]) -> None:
-            if self._wanted.pop(name, None) is None:
-                return
-            found = [parameter_value_to_python(value) for value in future.result().values]
-            self._node.destroy_client(lister)
-            self._node.destroy_client(getter)
-            self._tell(name, dict(zip(names, found, strict=True)))
-
-        lister.call_async(ListParameters.Request()).add_done_callback(got)
+    def _complain(self, reason: str) -> None:
+        self._node.get_logger().error(
+            f'The lathe does not say what machine it is: {reason}', throttle_duration_sec=60.0
+        )

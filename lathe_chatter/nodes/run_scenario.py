@@ -13,9 +13,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from lathe_chatter.model.parameters import LATHE
-from lathe_chatter.nodes.deferred_signals import HeldSignals
+from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
-from lathe_chatter.nodes.process_group import Cell, RunFailedError
+from lathe_chatter.nodes.process_group import ProcessGroup, RunFailedError
 from lathe_chatter.scenario import Scenario
 
 _START_PATIENCE = 60.0
@@ -53,7 +53,7 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
             raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
         LATHE[name].check(value)
     try:
-        with HeldSignals() as held:
+        with DeferredSignals() as held:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             operator = Operator(scenario, tell=console.print)
             executor = SingleThreadedExecutor()
@@ -61,7 +61,7 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
 
             def spin() -> None:
                 executor.spin_once(timeout_sec=0.1)
-                held.heed()
+                held.deliver()
 
             try:
                 return _play(operator, spin, file, output, console)
@@ -79,7 +79,7 @@ def _play(
 ) -> bool:
     """Play with an operator who is there; whether it was interrupted."""
     interrupted = False
-    with Cell() as cell:
+    with ProcessGroup() as cell:
 
         def spin() -> None:
             spin_once()
@@ -115,7 +115,7 @@ def _play(
 def _let_graph_settle(executor: SingleThreadedExecutor) -> None:
     """Wait until nobody is told any more that the nodes of the cell are gone.
 
-    Fast DDS may wait for itself for ever where a participant goes meanwhile (forced_end.py).
+    Fast DDS may wait for itself for ever where a participant goes meanwhile (`exit_within`).
     """
     until = time.monotonic() + _SETTLING
     while (left := until - time.monotonic()) > 0.0:

@@ -14,7 +14,7 @@ from std_msgs.msg import Float64MultiArray
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.messages import BlockReader
-from lathe_chatter.nodes.polled_subscription import Drained
+from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.samples.continuity import follow_evenly
 
 _TOPIC = 'lathe/samples'
@@ -51,7 +51,7 @@ class SampleFeed:
         self._complain = complain
         self._reader = BlockReader()
         self._known: frozenset[tuple[int, ...]] = frozenset()
-        self._messages = Drained(
+        self._messages = PolledSubscription(
             node,
             Float64MultiArray,
             _TOPIC,

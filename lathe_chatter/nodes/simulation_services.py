@@ -24,11 +24,11 @@ except ImportError:
 else:
     AVAILABLE = True
 
-_MOST_STEPS = 100_000
+MAX_STEPS = 100_000
 """Ticks in one request: more would leave other requests unanswered for too long."""
 
 
-def offer(simulator: Simulator) -> None:
+def create_services(simulator: Simulator) -> None:
     """Create the services on a node."""
     services = _Services(simulator)
     simulator.create_service(
@@ -94,9 +94,9 @@ class _Services:
     def step(self, request: Any, response: Any) -> Any:
         """Make ticks while paused."""
         result = response.result
-        if request.steps > _MOST_STEPS:
+        if request.steps > MAX_STEPS:
             result.result = Result.RESULT_OPERATION_FAILED
-            result.error_message = f'At most {_MOST_STEPS} ticks in one request.'
+            result.error_message = f'At most {MAX_STEPS} ticks in one request.'
             return response
         _report(result, self._simulator.step(request.steps), Result.RESULT_OPERATION_FAILED)
         return response

@@ -5,13 +5,39 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
+import numpy as np
+
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.nodes.control import RunControl, RunState
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
-from lathe_chatter.nodes.pacing import SECOND, Durations, Pacer
+from lathe_chatter.nodes.real_time import SECOND, Pacer
 
 _MICRO = 1e-3
 """us in a ns."""
+_LATEST = 4096
+
+
+class Durations:
+    """The latest durations of something done over and over, and their quantiles."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._ring = np.zeros(_LATEST)
+        self._count = 0
+
+    def add(self, duration: float) -> None:
+        """Note one."""
+        self._ring[self._count % _LATEST] = duration
+        self._count += 1
+
+    def quantiles(self, *fractions: float) -> tuple[float, ...]:
+        """The quantiles of those noted since `clear`, 4096 at most; zeros where none were."""
+        known = self._ring[: min(self._count, _LATEST)]
+        return tuple(np.quantile(known, fractions)) if known.size else (0.0,) * len(fractions)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._count = 0
 
 
 class _Mark(NamedTuple):
@@ -23,7 +49,7 @@ class _Mark(NamedTuple):
     at: int
 
 
-class LatheMeter:
+class TickStatistics:
     """Counts and times the ticks, and turns them into statuses.
 
     Args:

@@ -28,7 +28,7 @@ PATIENCE = 120.0
 """s: the start of a node takes 20 s where others keep the machine busy."""
 SETTLING = 0.3
 """s in which DDS hears that processes have ended: Fast DDS may crash, or wait for itself for ever,
-where the participant of a test goes meanwhile (lathe_chatter/nodes/forced_end.py)."""
+where the participant of a test goes meanwhile (`node_main.exit_within`)."""
 SpinUntil = Callable[..., None]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lathe_chatter.nodes.deferred_signals import HeldSignals
+from lathe_chatter.nodes.deferred_signals import DeferredSignals
 
 
 @pytest.fixture(autouse=True)
@@ -28,25 +28,25 @@ def handlers() -> Iterator[list[int]]:
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_waits_until_it_is_heeded(number: signal.Signals) -> None:
-    with HeldSignals() as held:
-        held.heed()
+    with DeferredSignals() as held:
+        held.deliver()
         os.kill(os.getpid(), number)
         with pytest.raises(KeyboardInterrupt):
-            held.heed()
-        held.heed()  # once
+            held.deliver()
+        held.deliver()  # once
 
 
 def test_the_first_of_several_signals_counts(handlers: list[int]) -> None:
-    with HeldSignals() as held:
+    with DeferredSignals() as held:
         for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGTERM):
             os.kill(os.getpid(), number)
         with pytest.raises(KeyboardInterrupt):
-            held.heed()
+            held.deliver()
     assert handlers == [signal.SIGTERM]
 
 
 def test_what_nobody_heeded_comes_at_the_end(handlers: list[int]) -> None:
-    with pytest.raises(KeyboardInterrupt), HeldSignals():
+    with pytest.raises(KeyboardInterrupt), DeferredSignals():
         os.kill(os.getpid(), signal.SIGHUP)
     assert handlers == [signal.SIGHUP]
     with pytest.raises(KeyboardInterrupt):  # and the handler is back
@@ -58,13 +58,13 @@ def test_an_error_goes_before_a_signal() -> None:
         os.kill(os.getpid(), signal.SIGINT)
         raise ValueError('the real reason')
 
-    with pytest.raises(ValueError, match='real'), HeldSignals():
+    with pytest.raises(ValueError, match='real'), DeferredSignals():
         fail_when_told_to_end()
 
 
 def test_a_signal_that_is_ignored_stays_ignored() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    with HeldSignals() as held:
+    with DeferredSignals() as held:
         os.kill(os.getpid(), signal.SIGHUP)
-        held.heed()
+        held.deliver()
     assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN

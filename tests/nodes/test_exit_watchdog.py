@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-ARM = 'import ctypes, sys, threading; from lathe_chatter.nodes.exit_watchdog import end_within; '
+ARM = 'import ctypes, sys, threading; from lathe_chatter.nodes.node_main import exit_within; '
 # PyDLL calls with the GIL held, as rclpy does where it destroys a node.
 STUCK = 'ctypes.PyDLL(None).pause()'
 
@@ -20,14 +20,14 @@ def end_of(program: str) -> int:
 @pytest.mark.skipif(sys.platform != 'linux', reason='the timer is that of Linux')
 @pytest.mark.parametrize('code', [0, 2])
 def test_a_process_that_is_stuck_with_the_gil_held_ends(code: int) -> None:
-    assert end_of(f'end_within(0.3, {code}); {STUCK}') == code
+    assert end_of(f'exit_within(0.3, {code}); {STUCK}') == code
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='the timer is that of Linux')
 def test_a_process_that_is_stuck_while_python_ends_ends() -> None:
     stuck = f'class Stuck:\n def __del__(self): {STUCK}\nkept = Stuck()\n'
-    assert end_of(f'end_within(0.5, 3)\n{stuck}') == 3
+    assert end_of(f'exit_within(0.5, 3)\n{stuck}') == 3
 
 
 def test_one_that_ends_by_itself_has_its_own_code() -> None:
-    assert end_of('end_within(30.0, 1); sys.exit(4)') == 4
+    assert end_of('exit_within(30.0, 1); sys.exit(4)') == 4

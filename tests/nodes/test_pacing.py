@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lathe_chatter.nodes.pacing import SECOND, Durations, Pacer
+from lathe_chatter.nodes.real_time import SECOND, Pacer
 
 TICK = 2_000_000
 
@@ -91,14 +91,3 @@ def test_a_slow_factor_waits() -> None:
     pacer = Pacer(TICK, 0.01)
     pacer.start(0)
     assert [pacer.due(k * TICK) for k in range(1, 101)] == [0] * 49 + [1] + [0] * 50
-
-
-def test_quantiles_are_those_of_the_latest() -> None:
-    durations = Durations()
-    assert durations.quantiles(0.5, 1.0) == (0.0, 0.0)
-    for value in range(10_000):
-        durations.add(value)
-    assert durations.quantiles(0.0, 1.0) == (10_000 - 4096, 9999)
-    durations.clear()
-    durations.add(3.0)
-    assert durations.quantiles(0.5) == (3.0,)

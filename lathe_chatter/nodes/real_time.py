@@ -1,0 +1,234 @@
+"""Real time: how many ticks are due, the loop that makes them, and its place on a busy machine.
+
+Pacing: what is due follows from the time that has passed, never from how often somebody called.
+Where the process falls behind by more than it may catch up at once, the excess is given up,
+counted as lag and reported.
+
+The loop: an executor costs ten times as much as a tick of the lathe, and hands a timer from
+thread to thread before it fires. So the loop sleeps by itself until the next tick, and lets the
+executor look for requests only every few ticks; where one was waiting, after the very next tick.
+
+Scheduling: Linux shares a core fairly, but a task that wakes may wait while others finish their
+slices, a few ms. Since 6.12 a task may ask for slices of its own that are short, and is then
+woken sooner; its share of the core stays the same, and no privilege is needed. See
+sched_setattr(2), sched_runtime of SCHED_OTHER. Where the system permits real-time scheduling (a
+limit `rtprio`, or CAP_SYS_NICE), a thread that sleeps most of its time is woken at once.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from rclpy.context import Context
+from rclpy.executors import Executor
+
+SECOND = 1_000_000_000
+LOOK_UP = 0.1
+"""s after which a node that nothing happens to looks whether it was told to end."""
+SERVE_PERIOD = 10_000_000
+"""ns after which the executor looks for requests that nobody knows of."""
+_MARGIN = 500_000
+"""ns before the next tick in which the executor is not asked any more: it may come back late."""
+_SET_ATTRIBUTES = {'x86_64': 314, 'aarch64': 274}
+_SLICE = 100_000
+"""ns, the shortest that Linux gives."""
+
+
+@dataclass
+class Pacer:
+    """Ticks due against a clock in nanoseconds.
+
+    Attributes:
+        tick: Simulated duration of a tick, ns.
+        factor: Simulated seconds per second of the clock, > 0.
+        patience: The most that may be caught up in one go, ns of the clock.
+        keeps_all: Whether the excess is not given up but made later: where the clock is
+            another's simulated time, all of it counts.
+        lag: What was given up since the start, ns of the clock.
+        overruns: How often something was given up.
+    """
+
+    tick: float
+    factor: float = 1.0
+    patience: float = 0.05 * SECOND
+    keeps_all: bool = False
+    lag: float = 0.0
+    overruns: int = 0
+    _origin: float | None = None
+    _done: int = 0
+
+    @property
+    def period(self) -> float:
+        """From one tick to the next, ns of the clock."""
+        return self.tick / self.factor
+
+    def start(self, now: int) -> None:
+        """Let the next tick be due one period from now: at first, and after a pause."""
+        self._origin, self._done = now, 0
+
+    def must_start(self, now: int) -> bool:
+        """Whether it was never started, or the clock has gone back and so has started again."""
+        return self._origin is None or self.lateness(now) < -self.period
+
+    def change(self, factor: float, now: int) -> None:
+        """Go on with another factor, as late as it is."""
+        late = self.lateness(now)
+        self.factor = factor
+        self.start(now)
+        self._origin = now - late
+
+    def due(self, now: int) -> int:
+        """The ticks to make now; they count as made.
+
+        A call up to half a period early counts as in time, so that a timer of the same period
+        makes one tick each time in spite of its jitter.
+        """
+        ticks = max(0, int(self.lateness(now) / self.period + 0.5))
+        allowed = max(1, int(self.patience / self.period))
+        if ticks > allowed:
+            if not self.keeps_all:
+                excess = (ticks - allowed) * self.period
+                self._origin = (self._origin or 0.0) + excess
+                self.lag += excess
+                self.overruns += 1
+            ticks = allowed
+        self._done += ticks
+        return ticks
+
+    def next_wake(self, now: int) -> int:
+        """When to call next: when the next tick is due, but no sooner than after a tick's time.
+
+        At a factor above 1 several ticks are made in one go.
+        """
+        if self.factor > 1.0:
+            return now + int(self.tick)
+        return now - int(self.lateness(now) - self.period)
+
+    def lateness(self, now: int) -> float:
+        """How long ago the last tick that was made had been due, ns; negative if it is early."""
+        return 0.0 if self._origin is None else now - self._origin - self._done * self.period
+
+
+class Tickable(Protocol):
+    """A node of rclpy with a task at set times."""
+
+    context: Context
+
+    def next_wake(self) -> int | None:
+        """When `wake` wants to be called, ns of time.monotonic_ns(); None for not by time."""
+
+    def wake(self) -> None:
+        """Do what is due."""
+
+    def update_scheduling(self) -> None:
+        """Look after the scheduling of this thread, from time to time."""
+
+
+def spin_in_ticks(
+    executor: Executor,
+    node: Tickable,
+    ended: Callable[[], bool],
+    serve_period: int = SERVE_PERIOD,
+) -> None:
+    """Wake and serve a node until `ended` says so or its context is shut down.
+
+    Args:
+        executor: Serves its requests.
+        node: Which; its times come first.
+        ended: Looked at after each tick, and ten times a second while there is none.
+        serve_period: ns after which the executor looks for requests that nobody knows of.
+    """
+    executor.add_node(node)
+    serve_at = 0
+    try:
+        while node.context.ok() and not ended():
+            wake_at = node.next_wake()
+            if wake_at is None:
+                executor.spin_once(timeout_sec=LOOK_UP)
+                continue
+            now = time.monotonic_ns()
+            if now >= serve_at:
+                busy = _serve(executor, now, wake_at - _MARGIN)
+                serve_at = 0 if busy else now + serve_period
+                node.update_scheduling()
+            left = wake_at - time.monotonic_ns()
+            if left > 0:
+                time.sleep(left / SECOND)
+            node.wake()
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()
+
+
+def _serve(executor: Executor, now: int, until: int) -> bool:
+    """Serve what waits, and what comes in a while; whether anything did."""
+    left = max(until - now, 0)
+    executor.spin_once(timeout_sec=left / SECOND)
+    busy = False
+    while (now := time.monotonic_ns()) < until:
+        busy = True
+        executor.spin_once(timeout_sec=(until - now) / SECOND)
+    return busy
+
+
+class RealTime:
+    """Real-time scheduling (SCHED_RR) of the calling thread, while it is wanted and permitted.
+
+    It is not passed on to threads and processes that are started meanwhile.
+
+    Args:
+        priority: 1 (lowest) to 99; 0 for never.
+    """
+
+    def __init__(self, priority: int) -> None:
+        """Keep what somebody has chosen for the process, if anybody has."""
+        self._priority = priority
+        self._possible = (
+            priority > 0
+            and platform.system() == 'Linux'
+            and os.sched_getscheduler(0) == os.SCHED_OTHER
+        )
+        self.held = False
+
+    @property
+    def word(self) -> str:
+        """What the thread has, for people."""
+        return f'real time, priority {self._priority}' if self.held else 'ordinary'
+
+    def hold(self, *, wanted: bool) -> None:
+        """Take it, or give it back."""
+        if not self._possible or wanted == self.held:
+            return
+        policy = os.SCHED_RR | os.SCHED_RESET_ON_FORK if wanted else os.SCHED_OTHER
+        try:
+            os.sched_setscheduler(0, policy, os.sched_param(self._priority if wanted else 0))
+        except PermissionError:
+            self._possible = False
+            return
+        self.held = wanted
+        if not wanted:
+            ask_for_short_slices()
+
+
+def ask_for_short_slices() -> bool:
+    """Ask for this thread and those that it starts later.
+
+    Returns:
+        Whether the system took the request; one before 6.12 takes it and does nothing.
+    """
+    call = _SET_ATTRIBUTES.get(platform.machine())
+    if platform.system() != 'Linux' or call is None:
+        return False
+    if os.sched_getscheduler(0) != os.SCHED_OTHER:
+        return False  # somebody has given it a better place already
+    nice = os.getpriority(os.PRIO_PROCESS, 0)
+    # size, policy, flags, nice, priority, runtime, deadline, period, two clamps of utilisation
+    attributes = struct.pack('IIQiIQQQII', 56, os.SCHED_OTHER, 0, nice, 0, _SLICE, 0, 0, 0, 0)
+    return int(ctypes.CDLL(None).syscall(call, 0, attributes, 0)) == 0
