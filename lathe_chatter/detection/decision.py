@@ -11,6 +11,7 @@ growth explains, only the growth rate counts until the energy is down again.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -27,42 +28,11 @@ from lathe_chatter.detection.baseline import (
     growth_by_energy,
     restart_baseline,
 )
-from lathe_chatter.detection.detector_state import (
-    ALARMED,
-    CALM,
-    FORCED_AMPLITUDE,
-    HOLDING,
-    HOPS,
-    ONCE,
-    PEAK,
-    PEAK_ONCE,
-    RAMPING,
-    RATIO,
-    RISE,
-    SATURATED,
-    SCORE,
-    SEEN,
-    SINCE_ALARM,
-    SINCE_JUMP,
-    SMALLEST,
-    STATE,
-    STEPPED,
-    STRICTNESS,
-    SUSPECTED,
-    USUAL,
-    WINDOWS,
-    Ledger,
-)
-from lathe_chatter.detection.estimate_output import cuts, state_of, tell
-from lathe_chatter.detection.identification import (
-    ANGULAR_FREQUENCY,
-    CLEARNESS,
-    GROWTH,
-    GROWTH_ERROR,
-    WINDOW_TOOL_POWER,
-)
-from lathe_chatter.detection.kernels import Complex
-from lathe_chatter.detection.signals import FORCE_FORCE, OUTPUTS, PHASE_SEEN, TOOL_MEAN
+from lathe_chatter.detection.detector_state import HOPS, WINDOWS, DetectorState
+from lathe_chatter.detection.estimate_output import is_cutting, state_of, write_figures
+from lathe_chatter.detection.filters import Complex
+from lathe_chatter.detection.records import Records
+from lathe_chatter.detection.signals import PHASE_SEEN
 
 LIMITS = np.array([10.0, 7.2, 6.1, 5.5, 5.1, 4.7])
 """Growth rate over its standard error that is an alarm by itself, in each window."""
@@ -104,24 +74,24 @@ _QUIET = 0.12
 
 
 @compiled()
-def _surely_stable(windows: Array) -> bool:
+def _surely_stable(windows: Records) -> bool:
     """Whether one of the windows that know of a new cut at once says that it is stable."""
     for number in range(_TRUSTED + 1):
         known = windows[number]
-        if known[GROWTH] < _SURELY_STABLE * known[GROWTH_ERROR]:
+        if known.growth < _SURELY_STABLE * known.growth_error:
             return True
     return False
 
 
 @compiled()
-def _score(ledger: Ledger, windows: Array, model: bool, forced: bool) -> float:
+def _score(state: DetectorState, windows: Records, model: bool, forced: bool) -> float:
     """1 is an alarm."""
-    numbers, flags = ledger.numbers, ledger.flags
-    score, rise = 0.0, numbers[RISE]
+    now = state.now[0]
+    score, rise = 0.0, now.rise
     short = windows[1] if model else windows[2]
-    trust = min(max((windows[_TRUSTED, CLEARNESS] - 0.3) / 0.4, 0.0), 1.0) if model else 1.0
-    sureness = short[GROWTH] / short[GROWTH_ERROR]
-    if rise == rise and flags[HOLDING] == 0:
+    trust = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0) if model else 1.0
+    sureness = short.growth / short.growth_error
+    if rise == rise and now.holding == 0:
         score = rise
         if model and sureness == sureness:
             score += _GROWTH_SHARE * trust * min(sureness, _MOST_GROWTH)
@@ -129,45 +99,47 @@ def _score(ledger: Ledger, windows: Array, model: bool, forced: bool) -> float:
             score /= _ENERGY_LIMIT * (_BLURRED + (1.0 - _BLURRED) * trust)
         else:
             score /= _ENERGY_ALONE
-        if flags[STEPPED] != 0:
+        if now.stepped != 0:
             score /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
         if model and trust >= 0.5 and _surely_stable(windows):
             score = min(score, _VETO)
-    free = model or flags[SINCE_JUMP] > 12
+    free = model or now.since_jump > 12
     # Growth that is read from the energy says nothing new, and noise looks like it now and then.
     first = 0 if model else _PATIENT
-    if free and not (rise <= _RAISED and flags[HOLDING] == 0):
+    if free and not (rise <= _RAISED and now.holding == 0):
         for number in range(first, windows.shape[0]):
             known = windows[number]
             if not trust >= 0.5:
                 break
-            if known[GROWTH] > _SMALLEST_GROWTH:
+            if known.growth > _SMALLEST_GROWTH:
                 limit = LIMITS[number] if model else _STRICTER * LIMITS[number]
                 limit *= _BESIDE_FORCED if forced else 1.0
-                score = max(score, known[GROWTH] / known[GROWTH_ERROR] / limit)
+                score = max(score, known.growth / known.growth_error / limit)
     return score
 
 
 @compiled()
-def _saturated(ledger: Ledger, products: Array, newest: int, strongest: int, stiff: float) -> bool:
+def _saturated(
+    state: DetectorState, products: Records, newest: int, strongest: int, stiff: float
+) -> bool:
     """Whether the chatter has grown as far as it can: it is steady, and not the spindle's own."""
-    numbers, flags = ledger.numbers, ledger.flags
-    if not numbers[RATIO] > _ON_PHASE or flags[SEEN] < HOPS:
+    now = state.now[0]
+    if not now.once_per_turn > _ON_PHASE or now.hops_seen < HOPS:
         return False
     if stiff > 0.0:
         mean = power = count = 0.0
         for back in range(16):
             hop = products[(newest - back) % HOPS]
-            mean -= stiff * hop[TOOL_MEAN] / 16.0
-            power += hop[FORCE_FORCE]
-            count += hop[OUTPUTS]
+            mean -= stiff * hop.tool_mean / 16.0
+            power += hop.force_force
+            count += hop.outputs
         pulsation = 2.0 * math.sqrt(power / max(count, 1.0))
-        usual = numbers[USUAL] if numbers[USUAL] == numbers[USUAL] else 0.0
+        usual = now.usual_misfit if now.usual_misfit == now.usual_misfit else 0.0
         if pulsation > _OUT_OF_CUT * mean and mean > 10.0 * math.sqrt(usual):
             return True
     total = squares = 0.0
     for back in range(HOPS):
-        energy = abs(ledger.motion[(newest - back) % HOPS, strongest]) ** 2
+        energy = abs(state.motion[(newest - back) % HOPS, strongest]) ** 2
         total += energy / HOPS
         squares += energy**2 / HOPS
     spread = math.sqrt(max(squares - total**2, 0.0))
@@ -175,85 +147,84 @@ def _saturated(ledger: Ledger, products: Array, newest: int, strongest: int, sti
 
 
 @compiled()
-def _decide(ledger: Ledger, strongest_amplitude: float) -> None:
+def _decide(state: DetectorState, strongest_amplitude: float) -> None:
     """Raise the alarm, or clear it."""
-    numbers, flags = ledger.numbers, ledger.flags
-    alarm = numbers[SCORE] >= numbers[STRICTNESS] or flags[SATURATED] >= _SATURATED
+    now = state.now[0]
+    alarm = now.score >= now.strictness or now.saturated >= _SATURATED
     # What is left of a cut that has settled are roundings, and these repeat themselves.
-    alarm = alarm and strongest_amplitude > numbers[SMALLEST]
-    flags[SUSPECTED] = flags[SUSPECTED] + 1 if alarm else 0
-    if flags[ALARMED] == 0:
-        if flags[SUSPECTED] >= 1:
-            flags[ALARMED], flags[SINCE_ALARM], flags[CALM] = 1, 0, 0
-            numbers[PEAK], numbers[PEAK_ONCE] = strongest_amplitude, numbers[ONCE]
+    alarm = alarm and strongest_amplitude > now.smallest_amplitude
+    now.suspected = now.suspected + 1 if alarm else 0
+    if now.alarmed == 0:
+        if now.suspected >= 1:
+            now.alarmed, now.since_alarm, now.calm = 1, 0, 0
+            now.peak_amplitude, now.peak_spread = strongest_amplitude, now.spread
         return
-    flags[SINCE_ALARM] += 1
-    numbers[PEAK] = max(numbers[PEAK], strongest_amplitude)
-    numbers[PEAK_ONCE] = max(numbers[PEAK_ONCE], numbers[ONCE])
+    now.since_alarm += 1
+    now.peak_amplitude = max(now.peak_amplitude, strongest_amplitude)
+    now.peak_spread = max(now.peak_spread, now.spread)
     # Both the band and the spread once a turn must have died down; where the alarm came at the
     # level of the noise there is no way down but to the baseline.
-    down = strongest_amplitude < _QUIET * numbers[PEAK]
-    down = down and not numbers[ONCE] > 2.0 * _QUIET * numbers[PEAK_ONCE]
-    down = down or numbers[RISE] < ARMED
-    flags[CALM] = flags[CALM] + 1 if down else 0
-    if flags[CALM] >= _CALM:
-        flags[ALARMED] = flags[SATURATED] = 0
-        restart_baseline(ledger)
+    down = strongest_amplitude < _QUIET * now.peak_amplitude
+    down = down and not now.spread > 2.0 * _QUIET * now.peak_spread
+    down = down or now.rise < ARMED
+    now.calm = now.calm + 1 if down else 0
+    if now.calm >= _CALM:
+        now.alarmed = now.saturated = 0
+        restart_baseline(state)
 
 
 @compiled()
 def judge(
-    ledger: Ledger, newest: int, products: Array, windows: Array, phases: Array, poles: Complex,
-    centres: Array, figures: Array, model: bool,
+    state: DetectorState, settings: Any, products: Records, windows: Records, phases: Array,
+    poles: Complex, centres: Array, speed: float,
 ) -> None:  # fmt: skip
     """Judge the newest hop.
 
     Args:
-        ledger: Changed in place.
-        newest: Its place in the rings.
-        products: Of the last hops (HOPS, PRODUCTS_SIZE), as a ring.
+        state: Changed in place; `now.newest` is its place in the rings.
+        settings: A record of `signals.SETTINGS`.
+        products: Sums of the last hops (HOPS,), as a ring.
         windows: From `identification.identify`; written here where there is no model.
         phases: Once-per-turn statistics.
         poles: Of the resonators, per hop (bins,).
         centres: Their angular frequencies, 1/s (bins,).
-        figures: Speed, rev/s; hop, s; stiffness of the tool, N/m; amplitude from which on the
-            spindle's own vibration is told, m; gain of the band pass; 1 / (2 sine of half the
-            angle of vibration a turn) is limited to 1 / this (6,).
-        model: Whether `windows` come from a model of the machine.
+        speed: Of the spindle, rev/s.
     """
-    numbers, flags = ledger.numbers, ledger.flags
-    speed, period = figures[0], figures[1]
-    follow_speed(ledger, speed, 1.0 / max(speed * period, 1e-9))
-    strongest = follow_energy(ledger, newest)
+    now = state.now[0]
+    newest, period, model = now.newest, settings.period, settings.has_machine != 0
+    follow_speed(state, speed, 1.0 / max(speed * period, 1e-9))
+    strongest = follow_energy(state, newest)
     if phases[PHASE_SEEN].min() >= 1.0:
-        follow_phase(ledger, phases)
+        follow_phase(state, phases)
     wave = (np.nan, np.nan, np.nan)
     if not model:
         for number in range(WINDOWS.size):
             length = min(WINDOWS[number], HOPS - 1)
-            if number < 2 or flags[SEEN] < length + SETTLING:
-                windows[number, GROWTH] = windows[number, GROWTH_ERROR] = np.nan
+            if number < 2 or now.hops_seen < length + SETTLING:
+                windows[number].growth = windows[number].growth_error = np.nan
                 continue
-            wave = growth_by_energy(ledger, newest, strongest, length, period, poles[strongest])
-            windows[number, GROWTH], windows[number, GROWTH_ERROR] = wave[0], wave[1]
-            windows[number, ANGULAR_FREQUENCY] = wave[2] + centres[strongest]
-    flags[SEEN] += 1
-    omega = windows[2, ANGULAR_FREQUENCY]
+            wave = growth_by_energy(state, newest, strongest, length, period, poles[strongest])
+            windows[number].growth, windows[number].growth_error = wave[0], wave[1]
+            windows[number].angular_frequency = wave[2] + centres[strongest]
+    now.hops_seen += 1
+    omega = windows[2].angular_frequency
     comb = 1.0
     if omega == omega and speed > 0.0:
         comb = max(2.0 * abs(math.sin(0.5 * omega / speed)), 0.1)
-    amplitude = 2.0 * math.sqrt(max(windows[1, WINDOW_TOOL_POWER], 0.0)) / comb / figures[4]
-    follow_push(ledger, products, newest)
+    amplitude = 2.0 * math.sqrt(max(windows[1].tool_power, 0.0)) / comb / settings.gain
+    follow_push(state, products, newest)
     if model:
-        follow_misfit(ledger, products[newest], windows[_TRUSTED, CLEARNESS] > 0.5)
-    known = flags[RAMPING] == 0 and flags[SEEN] > SETTLING
-    forced = numbers[RATIO] < _OFF_PHASE and numbers[FORCED_AMPLITUDE] > figures[3]
-    numbers[SCORE] = _score(ledger, windows, model, forced) if known else 0.0
-    stiff = figures[2] if model else 0.0
-    if flags[ALARMED] == 0 and flags[RAMPING] == 0 and speed > 0.0:
-        steady = _saturated(ledger, products, newest, strongest, stiff)
-        flags[SATURATED] = flags[SATURATED] + 1 if steady else 0
-    _decide(ledger, amplitude)
-    tell(ledger, windows, wave, model, amplitude)
-    cutting = not model or cuts(windows[WINDOWS.size - 1], products, newest)
-    flags[STATE] = state_of(ledger, cutting, forced)
+        follow_misfit(state, products[newest], windows[_TRUSTED].clearness > 0.5)
+    known = now.ramping == 0 and now.hops_seen > SETTLING
+    forced = (
+        now.once_per_turn < _OFF_PHASE and now.synchronous_amplitude > settings.forced_amplitude
+    )
+    now.score = _score(state, windows, model, forced) if known else 0.0
+    stiff = settings.tool_stiffness if model else 0.0
+    if now.alarmed == 0 and now.ramping == 0 and speed > 0.0:
+        steady = _saturated(state, products, newest, strongest, stiff)
+        now.saturated = now.saturated + 1 if steady else 0
+    _decide(state, amplitude)
+    write_figures(state, windows, wave, model, amplitude)
+    cutting = not model or is_cutting(windows[WINDOWS.size - 1], products, newest)
+    now.state = state_of(state, cutting, forced)

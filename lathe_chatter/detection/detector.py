@@ -8,14 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.detection import detector_state as ledgers
-from lathe_chatter.detection.advice_timing import Adviser, Identified
-from lathe_chatter.detection.block_loop import HopFigures, take_hops
-from lathe_chatter.detection.framing import Break, Hops, Intake, Rate
-from lathe_chatter.detection.identification import WINDOW_SIZE, mechanics_of
-from lathe_chatter.detection.kernels import band_of, design, gain, thinning_of
-from lathe_chatter.detection.signals import PRODUCTS_SIZE, READING_SIZE, fresh_memory
-from lathe_chatter.detection.states import STATES, Estimate, Mode
+from lathe_chatter.detection.block_loop import take_hops
+from lathe_chatter.detection.detector_state import HOPS, UNKNOWN, WINDOWS, new_state
+from lathe_chatter.detection.estimate import STATES, Estimate, Mode
+from lathe_chatter.detection.filters import band_of, design, gain, thinning_of
+from lathe_chatter.detection.framing import Discontinuity, Framer, HopBlock, StreamFormat
+from lathe_chatter.detection.identification import FIT, NOISE_SUMS, mechanics_of
+from lathe_chatter.detection.records import record
+from lathe_chatter.detection.signals import HOP_SUMS, SETTINGS, new_memory
+from lathe_chatter.detection.speed_advice import Identified, SpeedAdviser
 from lathe_chatter.model import Machine
 
 _PAPER = Machine()
@@ -55,7 +56,7 @@ class ChatterDetector:
         """Begin with nothing known."""
         self._machine = machine
         self._speed_range = speed_range
-        self._adviser = Adviser(machine, speed_range)
+        self._adviser = SpeedAdviser(machine, speed_range)
         self._smallest = smallest_amplitude
         self._forced = forced_amplitude
         self._strictness = strictness
@@ -63,7 +64,7 @@ class ChatterDetector:
 
     def reset(self) -> None:
         """Forget everything, as at the start."""
-        self._intake = Intake()
+        self._framer = Framer()
         self._forget()
 
     def update(self, samples: Array, columns: Sequence[str]) -> Estimate:
@@ -79,15 +80,15 @@ class ChatterDetector:
         Raises:
             LayoutError: If there is no time or no displacement, or the shape is wrong.
         """
-        for item in self._intake.take(samples, columns):
-            if isinstance(item, Hops):
+        for item in self._framer.take(samples, columns):
+            if isinstance(item, HopBlock):
                 self._take(item)
-            elif isinstance(item, Rate):
+            elif isinstance(item, StreamFormat):
                 self._prepare(item)
-            elif item is Break.RESTART:
+            elif item is Discontinuity.RESTART:
                 self._forget()
             else:
-                self._begin_stretch()
+                self._start_stretch()
         return self._estimate
 
     def _forget(self) -> None:
@@ -96,126 +97,124 @@ class ChatterDetector:
         self._prepared: tuple[float, Mode] | None = None
         self._hop = 1
 
-    def _prepare(self, rate: Rate) -> None:
+    def _prepare(self, form: StreamFormat) -> None:
         """Get ready for a stretch with this rate and these channels."""
-        mode = Mode.of(self._machine, angle=rate.angle, workpiece=rate.workpiece)
-        if self._prepared == (rate.value, mode):
-            self._intake.hop = self._hop
+        mode = Mode.of(self._machine, angle=form.angle, workpiece=form.workpiece)
+        if self._prepared == (form.rate, mode):
+            self._framer.hop = self._hop
             return
-        self._prepared, self._mode = (rate.value, mode), mode
+        self._prepared, self._mode = (form.rate, mode), mode
         machine = self._machine
-        thinning, stride = thinning_of(machine, rate.value)
-        self._thinned = rate.value / thinning
+        thinning, stride = thinning_of(machine, form.rate)
+        self._thinned = form.rate / thinning
         outputs = max(1, round(_HOP * self._thinned / stride))
-        self._hop = self._intake.hop = thinning * stride * outputs
+        self._hop = self._framer.hop = thinning * stride * outputs
         self._kernels = design(machine, self._thinned, _DECAY)
         band = band_of(machine)
         self._mechanics = mechanics_of(machine or _PAPER, *band)
-        self._reading = np.zeros(READING_SIZE, np.int64)
-        self._reading[:] = (
-            thinning,
-            stride,
-            rate.angle,
-            rate.workpiece,
-            mode is Mode.FULL,
+        self._settings = record(
+            SETTINGS,
+            rate=form.rate,
+            period=self._hop / form.rate,
+            gain=gain(self._kernels, self._thinned, band.middle),
+            tool_stiffness=machine.tool.stiffness if machine is not None else 0.0,
+            forced_amplitude=self._forced,
+            slowest_turns=self._speed_range[0] / 60.0,
+            hop=self._hop,
+            thinning=thinning,
+            stride=stride,
+            has_angle=form.angle,
+            has_workpiece=form.workpiece,
+            has_machine=mode is Mode.FULL,
         )
-        self._period = self._hop / rate.value
-        tool = machine.tool.stiffness if machine is not None else 0.0
-        self._figures = np.array(
-            [
-                self._period,
-                tool,
-                self._forced,
-                gain(self._kernels, self._thinned, band.middle),
-                rate.value,
-                self._speed_range[0] / 60.0,
-            ]
-        )
-        self._ledger = ledgers.fresh_ledger(self._kernels.poles.size)
-        numbers = self._ledger.numbers
-        numbers[ledgers.SMALLEST], numbers[ledgers.STRICTNESS] = self._smallest, self._strictness
-        spindle = machine.workpiece.stiffness if machine is not None else 0.0
         middle = complex(0.0, 2.0 * math.pi * band.middle)
-        self._guess = np.array([middle, 0.0, spindle, middle])
-        self._begin_stretch()
+        self._state = new_state(
+            self._kernels.poles.size,
+            smallest_amplitude=self._smallest,
+            strictness=self._strictness,
+            root=middle,
+            deeper_root=middle,
+            root_cutting=0.0,
+            root_stiffness=machine.workpiece.stiffness if machine is not None else 0.0,
+        )
+        self._now = self._state.now[0]
+        self._noise, self._total = record(NOISE_SUMS), record(HOP_SUMS)
+        self._start_stretch()
 
-    def _begin_stretch(self) -> None:
+    def _start_stretch(self) -> None:
         """After a gap: no signal reaches across it, the alarm and what is usual do."""
         if self._prepared is None:
             return
-        turn = self._thinned / max(self._figures[HopFigures.SLOWEST], 0.5)
-        self._memory = fresh_memory(turn, self._kernels)
-        self._products = np.zeros((ledgers.HOPS, PRODUCTS_SIZE))
-        self._windows = np.full((ledgers.WINDOWS.size, WINDOW_SIZE), np.nan)
-        self._place = np.zeros(1, np.int64)
-        self._ledger.motion[:] = 0.0
-        self._ledger.speeds[:] = 0.0
-        self._ledger.flags[ledgers.SEEN] = 0
-        self._ledger.flags[ledgers.STATE] = ledgers.UNKNOWN
+        turn = self._thinned / max(self._speed_range[0] / 60.0, 0.5)
+        self._memory = new_memory(turn, self._kernels)
+        self._sums = np.zeros(HOPS, HOP_SUMS)
+        self._windows = np.repeat(record(FIT, math.nan), WINDOWS.size)
+        self._state.motion[:] = 0.0
+        self._state.speeds[:] = 0.0
+        self._now.newest = self._now.hops_seen = 0
+        self._now.state = UNKNOWN
 
-    def _take(self, hops: Hops) -> None:
+    def _take(self, hops: HopBlock) -> None:
         """Judge some hops; stop where a speed has to be recommended."""
-        done, flags = 0, self._ledger.flags
+        done, now = 0, self._now
         count = len(hops.block) // self._hop
         while done < count:
             done += take_hops(
                 hops.block[done * self._hop :],
-                self._hop,
-                self._reading,
+                self._settings,
+                self._mechanics,
+                self._noise,
+                self._total,
                 self._kernels,
                 self._memory,
-                self._products,
+                self._sums,
                 self._windows,
-                self._mechanics,
-                self._figures,
-                self._guess,
-                self._place,
-                self._ledger,
+                self._state,
             )
-            if flags[ledgers.ALARMED] == 0:
+            if not now.alarmed:
                 self._adviser.forget()
-            elif self._adviser.is_asked(since := int(flags[ledgers.SINCE_ALARM])):
+            elif self._adviser.is_due(since := int(now.since_alarm)):
                 modelled = self._mode is Mode.FULL
                 self._adviser.consider(self._identified(), since, modelled=modelled)
-        self._estimate = self._told(float(hops.times[-1]))
+        self._estimate = self._new_estimate(float(hops.times[-1]))
 
     def _speed(self) -> float:
         """rev/s; nan where the spindle is not seen."""
-        speed = float(self._ledger.speeds[0])
+        speed = float(self._state.speeds[0])
         return speed if self._mode.sees_spindle else math.nan
 
     def _identified(self) -> Identified:
-        numbers = self._ledger.numbers.tolist()
+        now = self._now
         return Identified(
-            numbers[ledgers.FIGURE_GROWTH],
-            numbers[ledgers.FIGURE_ERROR],
-            numbers[ledgers.FIGURE_OMEGA] / (2.0 * math.pi),
+            float(now.growth),
+            float(now.growth_error),
+            float(now.omega) / (2.0 * math.pi),
             60.0 * self._speed(),
-            numbers[ledgers.FIGURE_CUTTING],
-            numbers[ledgers.FIGURE_STIFFNESS],
+            float(now.cutting),
+            float(now.stiffness),
         )
 
-    def _told(self, time: float) -> Estimate:
-        numbers, flags = self._ledger.numbers.tolist(), self._ledger.flags
-        stiffness = numbers[ledgers.FIGURE_STIFFNESS]
+    def _new_estimate(self, time: float) -> Estimate:
+        now = self._now
+        stiffness = float(now.stiffness)
         engaged = None
         if self._machine is not None and math.isfinite(stiffness):
             bearing = self._machine.bearing_stiffness
             engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
         return Estimate(
             time,
-            STATES[int(flags[ledgers.STATE])],
-            bool(flags[ledgers.ALARMED]),
+            STATES[int(now.state)],
+            bool(now.alarmed),
             self._mode,
-            numbers[ledgers.FIGURE_GROWTH],
-            numbers[ledgers.FIGURE_ERROR],
-            numbers[ledgers.FIGURE_OMEGA] / (2.0 * math.pi),
-            numbers[ledgers.AMPLITUDE],
+            float(now.growth),
+            float(now.growth_error),
+            float(now.omega) / (2.0 * math.pi),
+            float(now.amplitude),
             self._speed() * 60.0,
-            numbers[ledgers.FIGURE_CUTTING],
+            float(now.cutting),
             stiffness,
             engaged,
-            numbers[ledgers.RATIO],
-            numbers[ledgers.SCORE],
+            float(now.once_per_turn),
+            float(now.score),
             self._adviser.advice,
         )

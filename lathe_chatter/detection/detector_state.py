@@ -1,4 +1,4 @@
-"""What the judgement remembers from hop to hop, by name: plain arrays for compiled code."""
+"""What the judgement remembers from hop to hop, by name: records and arrays for compiled code."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.detection.kernels import Complex
+from lathe_chatter.arrays import Array
+from lathe_chatter.detection.filters import Complex
+from lathe_chatter.detection.records import Records, record, record_type
 
 HOPS = 64
 """Hops that are remembered one by one."""
@@ -18,55 +19,32 @@ BLOCK_COUNT, LAG = 40, 3
 SPEEDS = 5
 """Hops over which a change of speed is seen."""
 
-# States, in the order of `states.STATES`.
+# States, in the order of `estimate.STATES`.
 IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = range(6)
 
-# Numbers that persist from hop to hop, and figures handed out.
-(
-    USUAL,
-    USUAL_SEEN,
-    PEAK,
-    PEAK_ONCE,
-    SCORE,
-    RATIO,
-    FIGURE_GROWTH,
-    FIGURE_ERROR,
-    FIGURE_OMEGA,
-    AMPLITUDE,
-    FIGURE_CUTTING,
-    FIGURE_STIFFNESS,
-    ONCE,
-    RISE,
-    FORCED_AMPLITUDE,
-    SMALLEST,
-    STRICTNESS,
-    NUMBERS_SIZE,
-) = range(18)
 
-(
-    SEEN,
-    STATE,
-    ALARMED,
-    SINCE_ALARM,
-    SUSPECTED,
-    CALM,
-    RAMPING,
-    HOLDING,
-    SINCE_JUMP,
-    BLOCKS,
-    BLOCK_FILL,
-    SATURATED,
-    STEPPED,
-    FLAGS_SIZE,
-) = range(14)
+_NOW = record_type(
+    """
+    usual_misfit misfits_seen peak_amplitude peak_spread score rise once_per_turn spread
+    synchronous_amplitude smallest_amplitude strictness amplitude
+    root_cutting root_stiffness
+    growth growth_error omega cutting stiffness
+    """,
+    """
+    newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
+    block_fill saturated stepped
+    """,
+    'root deeper_root',
+)
 
 
-class Ledger(NamedTuple):
+class DetectorState(NamedTuple):
     """What the judgement remembers, changed in place.
 
     Attributes:
-        numbers: (NUMBERS_SIZE,).
-        flags: (FLAGS_SIZE,).
+        now: One record. Figures that are handed out: `growth` to `stiffness`, `amplitude`,
+            `once_per_turn`, `score`. `newest`: place of the newest hop in the rings. `root`,
+            `deeper_root`: rightmost roots of a cut like the present one, and of a deeper one.
         motion: Resonators at the ends of the last hops, as a ring (HOPS, bins).
         usual: Mean product with the hop before, mean square, mean square innovation
             (3, bins); the first complex.
@@ -75,8 +53,7 @@ class Ledger(NamedTuple):
         speeds: Of the last hops, rev/s (SPEEDS,).
     """
 
-    numbers: Array
-    flags: Integers
+    now: Records
     motion: Complex
     usual: Complex
     blocks: Array
@@ -84,18 +61,13 @@ class Ledger(NamedTuple):
     speeds: Array
 
 
-def fresh_ledger(bins: int) -> Ledger:
-    """Nothing known."""
-    numbers = np.full(NUMBERS_SIZE, np.nan)
-    numbers[USUAL_SEEN] = numbers[SCORE] = 0.0
-    ledger = Ledger(
-        numbers,
-        np.zeros(FLAGS_SIZE, np.int64),
+def new_state(bins: int, **values: object) -> DetectorState:
+    """Nothing known but the fields of `now` that are given."""
+    return DetectorState(
+        record(_NOW, np.nan, misfits_seen=0.0, score=0.0, state=UNKNOWN, **values),
         np.zeros((HOPS, bins), complex),
         np.zeros((3, bins), complex),
         np.zeros((BLOCK_COUNT + LAG + 1, bins)),
         np.full(bins, np.nan),
         np.zeros(SPEEDS),
     )
-    ledger.flags[STATE] = UNKNOWN
-    return ledger

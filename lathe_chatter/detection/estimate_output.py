@@ -1,47 +1,26 @@
-"""What is told of the judgement: the state, and the figures of the window that knows best."""
+"""What is handed out: the state, and the figures of the window that knows best."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.baseline import SETTLING
 from lathe_chatter.detection.detector_state import (
-    ALARMED,
-    AMPLITUDE,
     CHATTER,
-    FIGURE_CUTTING,
-    FIGURE_ERROR,
-    FIGURE_GROWTH,
-    FIGURE_OMEGA,
-    FIGURE_STIFFNESS,
     FORCED,
     HOPS,
     IDLE,
-    RAMPING,
-    SCORE,
-    SEEN,
-    SINCE_ALARM,
-    SMALLEST,
     STABLE,
-    STRICTNESS,
     UNKNOWN,
     WATCH,
     WINDOWS,
-    Ledger,
+    DetectorState,
 )
-from lathe_chatter.detection.identification import (
-    ANGULAR_FREQUENCY,
-    CUTTING,
-    CUTTING_ERROR,
-    GROWTH,
-    GROWTH_ERROR,
-    STIFFNESS,
-)
-from lathe_chatter.detection.signals import TOOL_MEAN
+from lathe_chatter.detection.records import Records
 
 _WATCH = 0.75
 _ONSET = 8
@@ -51,13 +30,13 @@ _CUTS, _PUSHED = 4.0, 32
 
 
 @compiled()
-def cuts(known: Array, products: Array, newest: int) -> bool:
+def is_cutting(known: Any, products: Records, newest: int) -> bool:
     """Whether anything is cut: C w is clearly not zero, or the tool is pushed aside on average."""
-    if not known[CUTTING] <= _CUTS * known[CUTTING_ERROR]:
+    if not known.cutting <= _CUTS * known.cutting_error:
         return True
     mean = squares = 0.0
     for back in range(_PUSHED):
-        place = products[(newest - back) % HOPS, TOOL_MEAN]
+        place = products[(newest - back) % HOPS].tool_mean
         mean += place / _PUSHED
         squares += place**2 / _PUSHED
     # Neighbours vibrate together: the mean of 32 is about as sure as that of 8.
@@ -66,16 +45,16 @@ def cuts(known: Array, products: Array, newest: int) -> bool:
 
 
 @compiled()
-def state_of(ledger: Ledger, cutting: bool, forced: bool) -> int:
-    """Which of `states.STATES`, by its number."""
-    numbers, flags = ledger.numbers, ledger.flags
-    if flags[ALARMED] != 0:
+def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
+    """Which of `estimate.STATES`, by its number."""
+    now = state.now[0]
+    if now.alarmed != 0:
         return CHATTER
-    if flags[RAMPING] != 0 or flags[SEEN] < SETTLING:
+    if now.ramping != 0 or now.hops_seen < SETTLING:
         return UNKNOWN
     if not cutting:
         return IDLE
-    if numbers[SCORE] > _WATCH * numbers[STRICTNESS]:
+    if now.score > _WATCH * now.strictness:
         return WATCH
     if forced:
         return FORCED
@@ -83,32 +62,33 @@ def state_of(ledger: Ledger, cutting: bool, forced: bool) -> int:
 
 
 @compiled()
-def tell(
-    ledger: Ledger, windows: Array, wave: tuple[float, float, float], model: bool, amplitude: float
-) -> None:
+def write_figures(
+    state: DetectorState, windows: Records, wave: tuple[float, float, float], model: bool,
+    amplitude: float,
+) -> None:  # fmt: skip
     """Hand out the figures of the window that knows the growth rate best."""
-    numbers = ledger.numbers
-    numbers[AMPLITUDE] = amplitude
-    if not (amplitude > numbers[SMALLEST] or ledger.flags[ALARMED] != 0):
+    now = state.now[0]
+    now.amplitude = amplitude
+    if not (amplitude > now.smallest_amplitude or now.alarmed != 0):
         # What is left of a cut that has settled are roundings, from which nothing is known.
-        numbers[FIGURE_GROWTH] = numbers[FIGURE_ERROR] = numbers[FIGURE_OMEGA] = np.nan
-        numbers[FIGURE_CUTTING] = numbers[FIGURE_STIFFNESS] = np.nan
+        now.growth = now.growth_error = now.omega = np.nan
+        now.cutting = now.stiffness = np.nan
         return
     best = -1
-    alarmed, since = ledger.flags[ALARMED] != 0, ledger.flags[SINCE_ALARM]
+    alarmed, since = now.alarmed != 0, now.since_alarm
     for number in range(windows.shape[0]):
         if alarmed and best >= 0 and WINDOWS[number] > since + _ONSET:
             break
-        error = windows[number, GROWTH_ERROR]
-        if error == error and (best < 0 or error < windows[best, GROWTH_ERROR]):
+        error = windows[number].growth_error
+        if error == error and (best < 0 or error < windows[best].growth_error):
             best = number
     if best < 0:
-        numbers[FIGURE_GROWTH], numbers[FIGURE_ERROR], numbers[FIGURE_OMEGA] = wave
-        numbers[FIGURE_CUTTING] = numbers[FIGURE_STIFFNESS] = np.nan
+        now.growth, now.growth_error, now.omega = wave
+        now.cutting = now.stiffness = np.nan
         return
     known = windows[best]
-    numbers[FIGURE_GROWTH], numbers[FIGURE_ERROR] = known[GROWTH], known[GROWTH_ERROR]
-    numbers[FIGURE_OMEGA] = known[ANGULAR_FREQUENCY]
+    now.growth, now.growth_error = known.growth, known.growth_error
+    now.omega = known.angular_frequency
     if model:
-        numbers[FIGURE_CUTTING] = known[CUTTING]
-        numbers[FIGURE_STIFFNESS] = known[STIFFNESS]
+        now.cutting = known.cutting
+        now.stiffness = known.stiffness

@@ -20,11 +20,11 @@ _TIME, _ANGLE, _TOOL, _WORKPIECE = (
     'tool_displacement',
     'workpiece_displacement',
 )
-_TO_MEASURE = 33
+_RATE_SAMPLES = 33
 """Samples at the start of a stretch from which its sample rate is taken."""
 
 
-class Break(str, Enum):
+class Discontinuity(str, Enum):
     """Why the samples before and after do not belong together."""
 
     GAP = 'gap'
@@ -32,21 +32,21 @@ class Break(str, Enum):
     """Time has gone back."""
 
 
-class Rate(NamedTuple):
+class StreamFormat(NamedTuple):
     """What a stretch that begins here has.
 
     Attributes:
-        value: Sample rate, Hz.
+        rate: Samples a second, Hz.
         angle: Whether the spindle angle is seen.
         workpiece: Whether both displacements are; with one it stands where the tool's would.
     """
 
-    value: float
+    rate: float
     angle: bool
     workpiece: bool
 
 
-class Hops(NamedTuple):
+class HopBlock(NamedTuple):
     """Consecutive samples, a whole number of hops.
 
     Attributes:
@@ -59,7 +59,7 @@ class Hops(NamedTuple):
     block: Array
 
 
-class Intake:
+class Framer:
     """Finds the signals by their labels and follows their times.
 
     A sample that is no number counts as lost; a sensor that is dead or missing from the start
@@ -75,12 +75,14 @@ class Intake:
         self._last = math.nan
         self._dead: NDArray[np.bool_] = np.zeros(4, bool)
         self._names: tuple[str, ...] = ()
-        self._places, self._lacking = np.zeros(4, np.int64), False
+        self._places, self._incomplete = np.zeros(4, np.int64), False
 
-    def take(self, samples: Array, columns: Sequence[str]) -> Iterator[Break | Rate | Hops]:
+    def take(
+        self, samples: Array, columns: Sequence[str]
+    ) -> Iterator[Discontinuity | StreamFormat | HopBlock]:
         """What a batch of samples (n, k) brings.
 
-        The receiver sets `hop`, the samples in a hop, on every `Rate`.
+        The receiver sets `hop`, the samples in a hop, on every `StreamFormat`.
 
         Raises:
             LayoutError: If there is no time or no displacement, or the layout is not that of
@@ -89,20 +91,20 @@ class Intake:
         self._held.append(self._signals(samples, columns))
         self._count += len(samples)
         known = not math.isnan(self._step)
-        if self._count < (self.hop if known else _TO_MEASURE):
+        if self._count < (self.hop if known else _RATE_SAMPLES):
             return
         rows = np.concatenate(self._held) if len(self._held) > 1 else self._held[0]
         while len(rows):
             if math.isnan(self._step):
-                if len(rows) < _TO_MEASURE:
+                if len(rows) < _RATE_SAMPLES:
                     break
-                rate = self._measure(rows)
-                if rate is None:  # too short a stretch to know anything by
-                    whole = _unbroken(rows[:_TO_MEASURE], self._last, self._step, self._dead)
-                    restarted, rows = self._leave_behind(rows, min(whole, _TO_MEASURE - 1))
-                    yield Break.RESTART if restarted else Break.GAP
+                form = self._measure(rows)
+                if form is None:  # too short a stretch to know anything by
+                    whole = _unbroken(rows[:_RATE_SAMPLES], self._last, self._step, self._dead)
+                    restarted, rows = self._drop_to_break(rows, min(whole, _RATE_SAMPLES - 1))
+                    yield Discontinuity.RESTART if restarted else Discontinuity.GAP
                     continue
-                yield rate
+                yield form
             whole = _unbroken(rows, self._last, self._step, self._dead)
             broken = whole < len(rows)
             taken = whole - whole % self.hop
@@ -110,24 +112,24 @@ class Intake:
                 self._last = float(rows[taken - 1, 0])
                 block = rows[:taken, 1:].copy()
                 block[:, self._dead[1:]] = 0.0
-                yield Hops(rows[:taken, 0], block)
+                yield HopBlock(rows[:taken, 0], block)
             rows = rows[taken:]
             if not broken:
                 break
-            restarted, rows = self._leave_behind(rows, whole - taken)
-            yield Break.RESTART if restarted else Break.GAP
+            restarted, rows = self._drop_to_break(rows, whole - taken)
+            yield Discontinuity.RESTART if restarted else Discontinuity.GAP
         self._held, self._count = [rows], len(rows)
 
-    def _measure(self, rows: Array) -> Rate | None:
+    def _measure(self, rows: Array) -> StreamFormat | None:
         """Sample rate and channels of a stretch; None where it is broken before they are known."""
-        first = rows[:_TO_MEASURE]
+        first = rows[:_RATE_SAMPLES]
         steps = np.diff(first[:, 0])
         steps = steps[np.isfinite(steps)]
         self._step = float(np.median(steps)) if len(steps) else math.nan
         self._dead = np.asarray(~np.isfinite(first).any(axis=0))
         if self._dead[2] and not self._dead[3]:
             # The workpiece's sensor alone stands for the tool's.
-            self._places[2], self._places[3], self._lacking = self._places[3], -1, True
+            self._places[2], self._places[3], self._incomplete = self._places[3], -1, True
             rows[:, 2], rows[:, 3] = rows[:, 3], math.nan
             self._dead[2:] = False, True
         usable = self._step > 0.0 and not self._dead[2]
@@ -135,11 +137,11 @@ class Intake:
             self._step = self._step if self._step > 0.0 else 1.0
             self._dead[2] = False
             return None
-        if _unbroken(first, self._last, self._step, self._dead) < _TO_MEASURE:
+        if _unbroken(first, self._last, self._step, self._dead) < _RATE_SAMPLES:
             return None
-        return Rate(1.0 / self._step, not self._dead[1], not self._dead[3])
+        return StreamFormat(1.0 / self._step, not self._dead[1], not self._dead[3])
 
-    def _leave_behind(self, rows: Array, at: int) -> tuple[bool, Array]:
+    def _drop_to_break(self, rows: Array, at: int) -> tuple[bool, Array]:
         """Drop what is held up to the break; a stretch begins with the next sample."""
         times = rows[: at + 1, 0]
         before = times[at - 1] if at else self._last
@@ -167,13 +169,13 @@ class Intake:
                 )
             if places[2] < 0:
                 places[2], places[3] = places[3], -1
-            self._places, self._lacking = np.array(places), min(places) < 0
+            self._places, self._incomplete = np.array(places), min(places) < 0
         if samples.ndim != 2 or samples.shape[1] != len(names):
             raise LayoutError(
                 f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
             )
         found: Array = samples.take(self._places, axis=1)
-        if self._lacking:
+        if self._incomplete:
             found[:, self._places < 0] = math.nan
         return found
 

@@ -10,64 +10,31 @@ and differ in length: after a change of the cut the short ones know the new valu
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.kernels import BAND_BAND, FORCE_BAND, INERTIA_BAND
-from lathe_chatter.detection.kernels import FORCE_FORCE as SPILL_FORCE
-from lathe_chatter.detection.signals import (
-    CHIP_CHIP,
-    FORCE_CHIP,
-    FORCE_FORCE,
-    OUTPUTS,
-    PRODUCTS_SIZE,
-    PULL_PULL,
-    PULL_WORKPIECE,
-    TOOL_POWER,
-    WORKPIECE_WORKPIECE,
-)
+from lathe_chatter.detection.filters import BAND_BAND, FORCE_BAND, INERTIA_BAND
+from lathe_chatter.detection.filters import FORCE_FORCE as SPILL_FORCE
+from lathe_chatter.detection.records import Records, record, record_type
+from lathe_chatter.detection.signals import add, clear
 from lathe_chatter.model import Machine
 
-# What is known from one window.
-(
-    CUTTING,
-    CUTTING_ERROR,
-    STIFFNESS,
-    STIFFNESS_ERROR,
-    GROWTH,
-    GROWTH_ERROR,
-    ANGULAR_FREQUENCY,
-    CLEARNESS,
-    WINDOW_TOOL_POWER,
-    WINDOW_OUTPUTS,
-    WINDOW_SIZE,
-) = range(11)
-
-# The numbers of a machine that the compiled functions take.
-(
-    TOOL_MASS,
-    TOOL_DAMPING,
-    TOOL_STIFFNESS,
-    WORKPIECE_MASS,
-    WORKPIECE_DAMPING,
-    SOFTEST,
-    STIFFEST,
-    LOW,
-    HIGH,
-    MECHANICS_SIZE,
-) = range(10)
-
-# What the noise of the sensors adds to the sums of one output.
-(
-    NOISE_FORCE,
-    NOISE_FORCE_CHIP,
-    NOISE_CHIP,
-    NOISE_PULL_WORKPIECE,
-    NOISE_WORKPIECE,
-    NOISE_SIZE,
-) = range(6)
+FIT = record_type(
+    """
+    cutting cutting_error stiffness stiffness_error growth growth_error angular_frequency
+    clearness tool_power outputs
+    """
+)
+"""What one window knows, nan where unknown."""
+_MECHANICS = record_type(
+    'tool_mass tool_damping tool_stiffness workpiece_mass workpiece_damping '
+    'softest stiffest low high'
+)
+NOISE_SUMS = record_type('force force_chip chip pull_workpiece workpiece')
+"""What the noise of the sensors adds to the sums of one output."""
 
 _MOST_SEEDS = 32
 _STEP_LIMIT = 60.0
@@ -88,26 +55,40 @@ _AGREEMENT = 4.0
 """Standard errors within which a longer window tells the same stiffness."""
 
 
-def mechanics_of(machine: Machine, low: float, high: float) -> Array:
-    """A machine as numbers; the stiffness of the workpiece may be 20 % off (MECHANICS_SIZE,)."""
+def mechanics_of(machine: Machine, low: float, high: float) -> Records:
+    """A machine as one record; the stiffness of the workpiece may be 20 % off."""
     tool, workpiece = machine.tool, machine.workpiece
-    numbers = np.empty(MECHANICS_SIZE)
-    numbers[:5] = tool.mass, tool.damping, tool.stiffness, workpiece.mass, workpiece.damping
-    numbers[SOFTEST] = 0.8 * machine.workpiece_stiffness(seated=False)
-    numbers[STIFFEST] = 1.2 * machine.workpiece_stiffness(seated=True)
-    numbers[LOW], numbers[HIGH] = 2.0 * math.pi * low, 2.0 * math.pi * high
-    return numbers
+    return record(
+        _MECHANICS,
+        tool_mass=tool.mass,
+        tool_damping=tool.damping,
+        tool_stiffness=tool.stiffness,
+        workpiece_mass=workpiece.mass,
+        workpiece_damping=workpiece.damping,
+        softest=0.8 * machine.workpiece_stiffness(seated=False),
+        stiffest=1.2 * machine.workpiece_stiffness(seated=True),
+        low=2.0 * math.pi * low,
+        high=2.0 * math.pi * high,
+    )
+
+
+@compiled()
+def forget(fit: Any) -> None:
+    """Nothing known."""
+    fit.cutting = fit.cutting_error = fit.stiffness = fit.stiffness_error = np.nan
+    fit.growth = fit.growth_error = fit.angular_frequency = fit.clearness = np.nan
+    fit.tool_power = fit.outputs = np.nan
 
 
 @compiled()
 def characteristic(
-    mechanics: Array, cutting: float, stiffness: float, delay: float, s: complex
+    mechanics: Any, cutting: float, stiffness: float, delay: float, s: complex
 ) -> tuple[complex, complex, complex, complex]:
     """D(s) = T W + C w (1 - e^(-s tau)) (T + W) and its derivatives by s, C w and k."""
-    tool = (mechanics[TOOL_MASS] * s + mechanics[TOOL_DAMPING]) * s + mechanics[TOOL_STIFFNESS]
-    workpiece = (mechanics[WORKPIECE_MASS] * s + mechanics[WORKPIECE_DAMPING]) * s + stiffness
-    tool_slope = 2.0 * mechanics[TOOL_MASS] * s + mechanics[TOOL_DAMPING]
-    workpiece_slope = 2.0 * mechanics[WORKPIECE_MASS] * s + mechanics[WORKPIECE_DAMPING]
+    tool = (mechanics.tool_mass * s + mechanics.tool_damping) * s + mechanics.tool_stiffness
+    workpiece = (mechanics.workpiece_mass * s + mechanics.workpiece_damping) * s + stiffness
+    tool_slope = 2.0 * mechanics.tool_mass * s + mechanics.tool_damping
+    workpiece_slope = 2.0 * mechanics.workpiece_mass * s + mechanics.workpiece_damping
     echo = np.exp(-s * delay)
     both = tool + workpiece
     slope = tool_slope * workpiece + tool * workpiece_slope
@@ -118,7 +99,7 @@ def characteristic(
 
 @compiled()
 def root_near(
-    mechanics: Array, cutting: float, stiffness: float, delay: float, guess: complex
+    mechanics: Any, cutting: float, stiffness: float, delay: float, guess: complex
 ) -> complex:
     """Newton's method from a guess; nan where it does not converge or leaves the band."""
     s = guess
@@ -130,7 +111,7 @@ def root_near(
             step *= _STEP_LIMIT / length
         s -= step
         if length < 1e-6 * abs(s):
-            if 0.5 * mechanics[LOW] < s.imag < 2.0 * mechanics[HIGH]:
+            if 0.5 * mechanics.low < s.imag < 2.0 * mechanics.high:
                 return s
             break
     return complex(np.nan, np.nan)
@@ -138,14 +119,14 @@ def root_near(
 
 @compiled()
 def rightmost_in_band(
-    mechanics: Array, cutting: float, stiffness: float, delay: float, guess: complex
+    mechanics: Any, cutting: float, stiffness: float, delay: float, guess: complex
 ) -> complex:
     """The rightmost root that the guess and seeds all over the band lead to; the guess if none.
 
     The roots of a delay stand 1/tau apart along the imaginary axis; at speeds so low that
     more would be needed their real parts differ little from one to the next.
     """
-    low, high = mechanics[LOW], mechanics[HIGH]
+    low, high = mechanics.low, mechanics.high
     count = min(_MOST_SEEDS, max(4, int(delay * (high - low) / math.pi) + 2))
     best = root_near(mechanics, cutting, stiffness, delay, guess)
     for i in range(count):
@@ -169,7 +150,7 @@ def _at(row: Array, lag: float) -> float:
 
 
 @compiled()
-def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: Array) -> None:
+def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: Any) -> None:
     """What white noise of the thinned samples adds to the sums of one output.
 
     Args:
@@ -177,16 +158,16 @@ def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: 
         tool: Variance of the noise of the tool's thinned samples, m2.
         workpiece: The same of the workpiece.
         turn: Thinned samples a turn.
-        noise: Written (NOISE_SIZE,).
+        noise: A record of `NOISE_SUMS`, written.
     """
     change = 2.0 * (_at(spill[BAND_BAND], 0.0) - _at(spill[BAND_BAND], turn))
-    noise[NOISE_FORCE] = tool * _at(spill[SPILL_FORCE], 0.0)
-    noise[NOISE_FORCE_CHIP] = tool * (_at(spill[FORCE_BAND], 0.0) - _at(spill[FORCE_BAND], -turn))
-    noise[NOISE_CHIP] = (tool + workpiece) * change
-    noise[NOISE_WORKPIECE] = workpiece * change
+    noise.force = tool * _at(spill[SPILL_FORCE], 0.0)
+    noise.force_chip = tool * (_at(spill[FORCE_BAND], 0.0) - _at(spill[FORCE_BAND], -turn))
+    noise.chip = (tool + workpiece) * change
+    noise.workpiece = workpiece * change
     row = spill[INERTIA_BAND]
     change = 2.0 * _at(row, 0.0) - _at(row, turn) - _at(row, -turn)
-    noise[NOISE_PULL_WORKPIECE] = -workpiece * change
+    noise.pull_workpiece = -workpiece * change
 
 
 @compiled()
@@ -219,68 +200,69 @@ def _fit(
 
 @compiled()
 def identify(
-    products: Array, newest: int, lengths: Integers, mechanics: Array, noise: Array,
-    figures: Array, guess: complex, deeper: complex, windows: Array,
+    products: Records, newest: int, lengths: Integers, mechanics: Any, noise: Any,
+    delay: float, now: Any, total: Any, windows: Records,
 ) -> None:  # fmt: skip
     """What every window says.
 
     Args:
-        products: Of the last hops (hops, PRODUCTS_SIZE), as a ring.
+        products: Sums of the last hops (hops,), as a ring.
         newest: Where the newest stands.
         lengths: Of the windows, hops, rising (windows,).
         mechanics: From `mechanics_of`.
         noise: From `noise_sums`.
-        figures: Delay, s; mean square misfit of the force in quiet cutting, N2, or nan; and of
-            a similar cut C w and k, N/m (4,).
-        guess: The rightmost root for the similar cut, 1/s.
-        deeper: That of a deeper one, which may be of another mode: both are followed.
-        windows: Written (windows, WINDOW_SIZE); nan where unknown.
+        delay: Of a turn, s.
+        now: Of the `DetectorState`: mean square misfit of the force in quiet cutting; C w, k and
+            rightmost root of a similar cut, and the root of a deeper one, which may be of another
+            mode: both are followed.
+        total: A record of `HOP_SUMS` to work in.
+        windows: Written (windows,); nan where unknown.
     """
-    delay, usual = figures[0], figures[1]
     _, slope, by_cutting, by_stiffness = characteristic(
-        mechanics, figures[2], figures[3], delay, guess
+        mechanics, now.root_cutting, now.root_stiffness, delay, now.root
     )
     usual_slopes = abs((by_cutting / slope).real), abs((by_stiffness / slope).real)
-    total = np.zeros(PRODUCTS_SIZE)
+    clear(total)
     done = 0
     for number in range(lengths.size):
         while done < lengths[number]:
-            total += products[(newest - done) % products.shape[0]]
+            add(total, products[(newest - done) % products.shape[0]])
             done += 1
         known = windows[number]
-        known[:] = np.nan
-        count = total[OUTPUTS]
-        known[WINDOW_OUTPUTS] = count
+        forget(known)
+        count = total.outputs
+        known.outputs = count
         if count < 2.0:
             continue
-        known[WINDOW_TOOL_POWER] = total[TOOL_POWER] / count
-        if total[CHIP_CHIP] <= 0.0 or total[WORKPIECE_WORKPIECE] <= 0.0:
+        known.tool_power = total.tool_power / count
+        if total.chip_chip <= 0.0 or total.workpiece_workpiece <= 0.0:
             continue
-        known[CUTTING], known[CUTTING_ERROR], known[CLEARNESS] = _fit(
-            total[FORCE_CHIP], total[CHIP_CHIP], total[FORCE_FORCE],
-            count * noise[NOISE_FORCE_CHIP], count * noise[NOISE_CHIP], count, usual,
+        known.cutting, known.cutting_error, known.clearness = _fit(
+            total.force_chip, total.chip_chip, total.force_force,
+            count * noise.force_chip, count * noise.chip, count,
+            now.usual_misfit,
         )  # fmt: skip
-        known[STIFFNESS], known[STIFFNESS_ERROR], _ = _fit(
-            total[PULL_WORKPIECE], total[WORKPIECE_WORKPIECE], total[PULL_PULL],
-            count * noise[NOISE_PULL_WORKPIECE], count * noise[NOISE_WORKPIECE], count, np.nan,
+        known.stiffness, known.stiffness_error, _ = _fit(
+            total.pull_workpiece, total.workpiece_workpiece, total.pull_pull,
+            count * noise.pull_workpiece, count * noise.workpiece, count, np.nan,
         )  # fmt: skip
     # The stiffness seldom changes: the longest window that agrees with a short one knows it best.
-    short, short_error = windows[_REFERENCE, STIFFNESS], windows[_REFERENCE, STIFFNESS_ERROR]
+    short, short_error = windows[_REFERENCE].stiffness, windows[_REFERENCE].stiffness_error
     for number in range(lengths.size):
         known = windows[number]
-        if known[CUTTING] != known[CUTTING]:
+        if known.cutting != known.cutting:
             continue
-        stiffness, error = known[STIFFNESS], known[STIFFNESS_ERROR]
+        stiffness, error = known.stiffness, known.stiffness_error
         for longer in range(lengths.size - 1, number, -1):
             other = windows[longer]
-            if abs(other[STIFFNESS] - short) < _AGREEMENT * (other[STIFFNESS_ERROR] + short_error):
-                stiffness, error = other[STIFFNESS], other[STIFFNESS_ERROR]
+            if abs(other.stiffness - short) < _AGREEMENT * (other.stiffness_error + short_error):
+                stiffness, error = other.stiffness, other.stiffness_error
                 break
-        cutting = max(known[CUTTING], 0.0)
-        stiffness = min(max(stiffness, mechanics[SOFTEST]), mechanics[STIFFEST])
-        s = root_near(mechanics, cutting, stiffness, delay, guess)
+        cutting = max(known.cutting, 0.0)
+        stiffness = min(max(stiffness, mechanics.softest), mechanics.stiffest)
+        s = root_near(mechanics, cutting, stiffness, delay, now.root)
         if not s.real > 0.0:
-            other = root_near(mechanics, cutting, stiffness, delay, deeper)
+            other = root_near(mechanics, cutting, stiffness, delay, now.deeper_root)
             if other.real > s.real or s.real != s.real:
                 s = other
         _, slope, by_cutting, by_stiffness = characteristic(
@@ -289,14 +271,14 @@ def identify(
         # Far off the curve is flat, and would make a wild value look sure.
         of_cutting = max(abs((by_cutting / slope).real), usual_slopes[0])
         of_stiffness = max(abs((by_stiffness / slope).real), usual_slopes[1])
-        by_cutting_error = known[CUTTING_ERROR] * of_cutting
+        by_cutting_error = known.cutting_error * of_cutting
         if s.real > 0.0:
             # Growth flattens with C w; what is sure is how much less the least likely C w gives.
-            least = max(cutting - _LIKELY * known[CUTTING_ERROR], 0.0)
+            least = max(cutting - _LIKELY * known.cutting_error, 0.0)
             lower = root_near(mechanics, least, stiffness, delay, s)
             if lower.real == lower.real:
                 by_cutting_error = max(by_cutting_error, (s.real - lower.real) / _LIKELY)
         variance = by_cutting_error**2 + (error * of_stiffness) ** 2
-        known[STIFFNESS], known[STIFFNESS_ERROR] = stiffness, error
-        known[GROWTH], known[GROWTH_ERROR] = s.real, math.sqrt(variance)
-        known[ANGULAR_FREQUENCY] = s.imag
+        known.stiffness, known.stiffness_error = stiffness, error
+        known.growth, known.growth_error = s.real, math.sqrt(variance)
+        known.angular_frequency = s.imag

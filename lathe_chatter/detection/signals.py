@@ -13,36 +13,29 @@ that is the spindle's own from vibration that is not.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.kernels import Complex, Kernels
+from lathe_chatter.detection.filters import Complex, Kernels
+from lathe_chatter.detection.records import Records, record, record_type
 
 # Rows of the history of thinned samples.
 ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, CHIP, HISTORY_ROWS = range(6)
 
-# What is counted: samples held, place one turn ago, from where the changes hold, ...
-FILLED, POINTER, CHANGES_FROM, SINCE_OUTPUT, COUNTS_SIZE = range(5)
+_COUNTS = record_type(integers='filled turn_before changes_from since_output')
+"""Samples held, place one turn ago, from where the changes hold, samples since an output."""
 
-# Sums over the outputs of one hop: force F, chip h, the changes u of workpiece and tool over a
-# turn, pull F - m x'' - c x' = k x; third differences of the raw samples; relative motion.
-(
-    FORCE_FORCE,
-    FORCE_CHIP,
-    CHIP_CHIP,
-    PULL_PULL,
-    PULL_WORKPIECE,
-    WORKPIECE_WORKPIECE,
-    TOOL_POWER,
-    OUTPUTS,
-    TOOL_NOISE,
-    WORKPIECE_NOISE,
-    TOOL_MEAN,
-    PRODUCTS_SIZE,
-) = range(12)
+HOP_SUMS = record_type(
+    """
+    force_force force_chip chip_chip pull_pull pull_workpiece workpiece_workpiece tool_power
+    outputs tool_noise workpiece_noise tool_mean
+    """
+)
+"""Sums over the outputs of one hop: force F, chip h, the changes u of workpiece and tool over a
+turn, pull F - m x'' - c x' = k x; third differences of the raw samples; mean of the tool."""
 
 PHASES = 8
 """Spindle angles at which a value is taken once a turn."""
@@ -50,8 +43,13 @@ _FORGETTING = 1.0 / 8.0
 # Rows of the once-per-turn statistics: running mean and variance, values seen.
 PHASE_MEAN, PHASE_VARIANCE, PHASE_SEEN, PHASE_ROWS = range(4)
 
-# How the samples are read.
-THINNING, STRIDE, HAS_ANGLE, HAS_WORKPIECE, HAS_MACHINE, READING_SIZE = range(6)
+SETTINGS = record_type(
+    'rate period gain tool_stiffness forced_amplitude slowest_turns',
+    'hop thinning stride has_angle has_workpiece has_machine',
+)
+"""How samples are read and judged: sample rate, Hz; length of a hop, s; gain of the band pass;
+stiffness, N/m; amplitude from which on the spindle's own vibration is told, m; slowest speed,
+rev/s. Samples in a hop and in a thinned sample, thinned samples in an output; what is there."""
 
 
 class Memory(NamedTuple):
@@ -59,23 +57,23 @@ class Memory(NamedTuple):
 
     Attributes:
         history: Thinned samples (HISTORY_ROWS, capacity).
-        counts: (COUNTS_SIZE,).
+        counts: One record.
         resonators: (bins,).
         phases: Once-per-turn statistics (PHASE_ROWS, PHASES).
     """
 
     history: Array
-    counts: Integers
+    counts: Records
     resonators: Complex
     phases: Array
 
 
-def fresh_memory(turn: float, kernels: Kernels) -> Memory:
+def new_memory(turn: float, kernels: Kernels) -> Memory:
     """Nothing remembered yet, with room for turns of up to `turn` thinned samples."""
     keep = int(1.1 * turn) + kernels.band.size + 32
     return Memory(
         np.zeros((HISTORY_ROWS, 2 * keep)),
-        np.zeros(COUNTS_SIZE, np.int64),
+        record(_COUNTS),
         np.zeros(kernels.poles.size, complex),
         np.zeros((PHASE_ROWS, PHASES)),
     )
@@ -97,37 +95,37 @@ def _interpolated(row: Array, index: int, x: float) -> float:
 
 
 @compiled()
-def _make_room(history: Array, counts: Integers) -> None:
+def _make_room(history: Array, counts: Any) -> None:
     """Forget the older half."""
     keep = history.shape[1] // 2
-    shift = counts[FILLED] - keep
+    shift = counts.filled - keep
     history[:, :keep] = history[:, shift : shift + keep].copy()
-    counts[FILLED] = keep
-    for place in (POINTER, CHANGES_FROM):
-        counts[place] = max(counts[place] - shift, 0)
+    counts.filled = keep
+    counts.turn_before = max(counts.turn_before - shift, 0)
+    counts.changes_from = max(counts.changes_from - shift, 0)
 
 
 @compiled()
-def _take_changes(history: Array, counts: Integers, reading: Integers) -> bool:
+def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     """Fill in the changes over a turn of the newest thinned sample; whether there are any."""
-    n = counts[FILLED] - 1
-    if reading[HAS_ANGLE] == 0:
+    n = counts.filled - 1
+    if settings.has_angle == 0:
         history[TOOL_CHANGE, n] = history[TOOL, n]
         history[CHIP, n] = history[TOOL, n] - history[WORKPIECE, n]
         return True
     angles = history[ANGLE]
     before = angles[n] - 1.0
-    p = counts[POINTER]
+    p = counts.turn_before
     while p + 1 < n and angles[p + 1] <= before:
         p += 1
-    counts[POINTER] = p
+    counts.turn_before = p
     if p < 2 or p > n - 4 or angles[p] > before:
-        counts[CHANGES_FROM] = n + 1
+        counts.changes_from = n + 1
         return False
     x = (before - angles[p]) / (angles[p + 1] - angles[p])
     tool = history[TOOL, n] - _interpolated(history[TOOL], p, x)
     history[TOOL_CHANGE, n] = history[CHIP, n] = tool
-    if reading[HAS_WORKPIECE] != 0:
+    if settings.has_workpiece != 0:
         history[CHIP, n] -= history[WORKPIECE, n] - _interpolated(history[WORKPIECE], p, x)
     return True
 
@@ -155,27 +153,49 @@ def _take_phase(history: Array, n: int, phases: Array) -> None:
 
 @compiled()
 def _take_products(
-    history: Array, first: int, kernels: Kernels, reading: Integers, products: Array
+    history: Array, first: int, kernels: Kernels, settings: Any, products: Any
 ) -> None:
     """Multiply the newest samples by the kernels and add up."""
     force = chip = tool = pull = place = 0j
     for i in range(kernels.band.size):
         change = history[TOOL_CHANGE, first + i]
         tool += kernels.band[i] * change
-        if reading[HAS_MACHINE] != 0:
+        if settings.has_machine != 0:
             moved = change - history[CHIP, first + i]
             force += kernels.force[i] * history[TOOL, first + i]
             chip += kernels.band[i] * history[CHIP, first + i]
             pull += kernels.force[i] * change - kernels.inertia[i] * moved
             place += kernels.band[i] * moved
-    products[FORCE_FORCE] += force.real**2 + force.imag**2
-    products[FORCE_CHIP] += force.real * chip.real + force.imag * chip.imag
-    products[CHIP_CHIP] += chip.real**2 + chip.imag**2
-    products[PULL_PULL] += pull.real**2 + pull.imag**2
-    products[PULL_WORKPIECE] += pull.real * place.real + pull.imag * place.imag
-    products[WORKPIECE_WORKPIECE] += place.real**2 + place.imag**2
-    products[TOOL_POWER] += tool.real**2 + tool.imag**2
-    products[OUTPUTS] += 1.0
+    products.force_force += force.real**2 + force.imag**2
+    products.force_chip += force.real * chip.real + force.imag * chip.imag
+    products.chip_chip += chip.real**2 + chip.imag**2
+    products.pull_pull += pull.real**2 + pull.imag**2
+    products.pull_workpiece += pull.real * place.real + pull.imag * place.imag
+    products.workpiece_workpiece += place.real**2 + place.imag**2
+    products.tool_power += tool.real**2 + tool.imag**2
+    products.outputs += 1.0
+
+
+@compiled()
+def clear(sums: Any) -> None:
+    """All 0."""
+    sums.force_force = sums.force_chip = sums.chip_chip = 0.0
+    sums.pull_pull = sums.pull_workpiece = sums.workpiece_workpiece = 0.0
+    sums.tool_power = sums.outputs = sums.tool_mean = 0.0
+    sums.tool_noise = sums.workpiece_noise = 0.0
+
+
+@compiled()
+def add(total: Any, hop: Any) -> None:
+    """Add what the fits need of a hop."""
+    total.force_force += hop.force_force
+    total.force_chip += hop.force_chip
+    total.chip_chip += hop.chip_chip
+    total.pull_pull += hop.pull_pull
+    total.pull_workpiece += hop.pull_workpiece
+    total.workpiece_workpiece += hop.workpiece_workpiece
+    total.tool_power += hop.tool_power
+    total.outputs += hop.outputs
 
 
 @compiled()
@@ -190,42 +210,40 @@ def _noise_of(block: Array, column: int) -> float:
 
 
 @compiled()
-def follow(
-    block: Array, reading: Integers, kernels: Kernels, memory: Memory, products: Array
-) -> None:
+def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, products: Any) -> None:
     """Take in one hop of samples.
 
     Args:
         block: Spindle angle, tool and workpiece displacement (n, 3), rev and m.
-        reading: (READING_SIZE,).
+        settings: A record of `SETTINGS`.
         kernels: From `kernels.design`.
         memory: Changed in place.
-        products: Written (PRODUCTS_SIZE,).
+        products: A record of `HOP_SUMS`, written.
     """
-    history, counts = memory.history, memory.counts
-    products[:] = 0.0
-    products[TOOL_NOISE] = _noise_of(block, 1)
-    products[WORKPIECE_NOISE] = _noise_of(block, 2)
-    thinning, taps = reading[THINNING], kernels.band.size
+    history, counts = memory.history, memory.counts[0]
+    clear(products)
+    products.tool_noise = _noise_of(block, 1)
+    products.workpiece_noise = _noise_of(block, 2)
+    thinning, taps = settings.thinning, kernels.band.size
     for start in range(0, block.shape[0], thinning):
-        if counts[FILLED] == history.shape[1]:
+        if counts.filled == history.shape[1]:
             _make_room(history, counts)
-        n = counts[FILLED]
+        n = counts.filled
         for row in range(3):
             total = 0.0
             for i in range(start, start + thinning):
                 total += block[i, row]
             history[row, n] = total / thinning
-        counts[FILLED] = n + 1
-        products[TOOL_MEAN] += history[TOOL, n] * thinning / block.shape[0]
-        if reading[HAS_ANGLE] != 0 and n > 0:
+        counts.filled = n + 1
+        products.tool_mean += history[TOOL, n] * thinning / block.shape[0]
+        if settings.has_angle != 0 and n > 0:
             _take_phase(history, n, memory.phases)
-        if not _take_changes(history, counts, reading):
+        if not _take_changes(history, counts, settings):
             continue
         for j in range(memory.resonators.size):
             memory.resonators[j] = kernels.poles[j] * memory.resonators[j] + history[CHIP, n]
-        counts[SINCE_OUTPUT] += 1
+        counts.since_output += 1
         first = n + 1 - taps
-        if counts[SINCE_OUTPUT] >= reading[STRIDE] and first >= counts[CHANGES_FROM]:
-            counts[SINCE_OUTPUT] = 0
-            _take_products(history, first, kernels, reading, products)
+        if counts.since_output >= settings.stride and first >= counts.changes_from:
+            counts.since_output = 0
+            _take_products(history, first, kernels, settings, products)

@@ -186,7 +186,7 @@ class MonitorNode(ParameterNode):
             else:
                 self.get_logger().info(clearance(estimate))
             self._told_advice = estimate.advice
-        elif estimate.advice.is_news_after(self._told_advice):
+        elif estimate.advice.differs_from(self._told_advice):
             self.get_logger().info(f'At {estimate.time:.6f} s: {estimate.advice.in_words()}.')
             self._told_advice = estimate.advice
         if changed:

@@ -66,7 +66,7 @@ def test_advice_is_news_where_it_says_another_thing() -> None:
     nothing, less, slower = Advice(), Advice((), 0.8, 3000.0), Advice((AdvisedSpeed(3000.0),))
     same, faster = Advice((AdvisedSpeed(3010.0),)), Advice((AdvisedSpeed(3600.0),))
     for told, now in [(nothing, slower), (nothing, less), (slower, faster), (less, slower)]:
-        assert now.is_news_after(told)
-        assert told is nothing or told.is_news_after(now)
+        assert now.differs_from(told)
+        assert told is nothing or told.differs_from(now)
     for told, now in [(nothing, nothing), (less, less), (slower, same), (slower, nothing)]:
-        assert not now.is_news_after(told)
+        assert not now.differs_from(told)

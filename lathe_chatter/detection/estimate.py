@@ -1,4 +1,4 @@
-"""What the detector says: the state of the cut and the figures that explain it."""
+"""`Estimate`: the state of the cut and the figures that explain it."""
 
 from __future__ import annotations
 
