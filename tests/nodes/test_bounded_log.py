@@ -1,0 +1,72 @@
+"""A flood of sentences is a few lines and a count, and nothing goes untold."""
+
+from __future__ import annotations
+
+import re
+
+from lathe_chatter.nodes.bounded_log import BURST, MAX_KINDS, PERIOD, BoundedLog
+
+
+class Lines:
+    """Where a log goes."""
+
+    def __init__(self) -> None:
+        self.info: object = lambda text: self.lines.append(('info', text))
+        self.warning: object = lambda text: self.lines.append(('warning', text))
+        self.error: object = lambda text: self.lines.append(('error', text))
+        self.lines: list[tuple[str, str]] = []
+        self.time = 100.0
+
+    def now(self) -> float:
+        return self.time
+
+
+def flooded(seconds: int, rate: int) -> tuple[Lines, int]:
+    """A log into which one kind of sentence was poured, and how often."""
+    out = Lines()
+    bounded = BoundedLog(out, out.now)
+    for k in range(seconds * rate):
+        out.time += 1.0 / rate
+        bounded.warning(f'{k} samples are missing.', 'missing')
+    out.time += PERIOD
+    bounded.look()
+    return out, seconds * rate
+
+
+def test_a_flood_is_a_burst_and_then_one_line_a_period_that_counts_the_rest() -> None:
+    out, poured = flooded(seconds=100, rate=1000)
+    assert len(out.lines) <= BURST + 100 / PERIOD + 1
+    counts = [int(m[1]) for _, t in out.lines if (m := re.search(r'\((\d+) of this kind', t))]
+    assert BURST + sum(counts) == poured
+
+
+def test_the_last_word_of_a_flood_is_told() -> None:
+    out, poured = flooded(seconds=3, rate=100)
+    assert out.lines[-1][0] == 'warning'
+    assert out.lines[-1][1].startswith(f'{poured - 1} samples are missing. (')
+
+
+def test_kinds_do_not_hold_each_other_back() -> None:
+    out = Lines()
+    bounded = BoundedLog(out, out.now)
+    for _ in range(100):
+        bounded.info('the same')
+    bounded.error('another')
+    assert out.lines == [('info', 'the same')] * BURST + [('error', 'another')]
+
+
+def test_after_a_quiet_period_a_kind_begins_anew() -> None:
+    out = Lines()
+    bounded = BoundedLog(out, out.now)
+    for k in range(20):
+        out.time += PERIOD
+        bounded.info(f'At {k} s.', 'time')
+    assert len(out.lines) == 20
+
+
+def test_names_without_end_are_one_kind_beyond_a_bound() -> None:
+    out = Lines()
+    bounded = BoundedLog(out, out.now)
+    for k in range(10 * MAX_KINDS):
+        bounded.info(f'topic {k}')
+    assert len(out.lines) == MAX_KINDS + BURST
