@@ -183,7 +183,7 @@ class LatheNode(ParameterNode):
         samples = self._lathe.advance(self._samples_per_tick)
         if len(samples):
             self._topics.publish(samples, self._stamp())
-            self._record.take(samples)
+            self._record.write(samples)
         if self._lathe.guard:
             self._end(self._lathe.guard)
         self._meter.note_tick(time.perf_counter_ns() - began, self._lathe)

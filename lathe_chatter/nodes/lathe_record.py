@@ -1,4 +1,4 @@
-"""What the lathe tells of its cut: to the log, and to a run of its own where `record` asks it."""
+"""What happens to the cut: into the log, and into a run of its own where `record` asks for it."""
 
 from __future__ import annotations
 
@@ -49,28 +49,28 @@ class LatheRecord:
             self._run = LatheRun(Path(self._folder), values, name=name)
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             node.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
-        self._tell(BEGINNING)
+        self._log(BEGINNING)
 
-    def take(self, samples: Array) -> None:
+    def write(self, samples: Array) -> None:
         """Write the samples of a tick (n, 8)."""
         if self._run is not None:
             try:
-                self._run.take(samples)
+                self._run.write(samples)
             except (OSError, LatheChatterError) as error:
                 self._fail(error)
 
     def changed(self, time: float, old: Cut, new: Cut) -> None:
         """The cut was changed at a simulated time, s."""
-        self._tell(change_sentence(time, old, new))
+        self._log(change_sentence(time, old, new))
 
     def knocked(self, time: float, impulse: float) -> None:
         """The tool was hit with an impulse, N s."""
-        self._tell(knock_sentence(time, impulse))
+        self._log(knock_sentence(time, impulse))
 
     def restarted(self, time: float, old: Cut, new: Cut) -> None:
         """The lathe begins again, with a cut that may have been asked for since its last tick."""
-        self._tell(change_sentence(time, old, new))
-        self._tell(BEGINNING_AGAIN)
+        self._log(change_sentence(time, old, new))
+        self._log(BEGINNING_AGAIN)
 
     def statuses(self) -> list[Status]:
         """What diagnostics show of the record, if there is one."""
@@ -89,11 +89,11 @@ class LatheRecord:
                 self._fail(error)
             self._run = None
 
-    def _tell(self, sentence: str) -> None:
+    def _log(self, sentence: str) -> None:
         if sentence:
             self._logger.info(sentence)
             if self._run is not None:
-                self._run.tell(sentence)
+                self._run.log(sentence)
 
     def _commit(self) -> None:
         if self._run is not None:

@@ -28,7 +28,7 @@ Write = Callable[[str, bytes, int, int, int], None]
 class RecordedTopic:
     """Hands every message on as it came, and follows what is lost on the way.
 
-    Messages wait in the middleware until `drain` takes them all: to be woken for each would
+    Messages wait in the middleware until `take` takes them all: to be woken for each would
     cost ten times as much as to take it.
 
     Args:
@@ -70,13 +70,13 @@ class RecordedTopic:
         self.numbering.settle(len(offers), time.monotonic())
         wanted = _matching(offers) if offers else self._qos
         if _asks_less(wanted, self._qos):
-            self.drain()
+            self.take()
             self._subscription.end()
             self._subscribe(wanted)
 
     def end(self) -> None:
         """Take what has arrived and was not yet served, and unsubscribe."""
-        self.drain()
+        self.take()
         self.numbering.settle(self._node.count_publishers(self.topic.name), math.inf)
         self._subscription.end()
 
@@ -84,12 +84,12 @@ class RecordedTopic:
         self._qos = qos
         self._subscription = PolledSubscription(self._node, self._class, self.topic.name, qos)
 
-    def drain(self) -> None:
+    def take(self) -> None:
         """Take everything that has arrived."""
         for data, info in self._subscription.take():
-            self._take(data, info)
+            self._write_one(data, info)
 
-    def _take(self, data: bytes, info: Mapping[str, Any]) -> None:
+    def _write_one(self, data: bytes, info: Mapping[str, Any]) -> None:
         number = info['publication_sequence_number'] or 0  # None where the middleware has none
         if number:
             self.numbering.take(number, time.monotonic())

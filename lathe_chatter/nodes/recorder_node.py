@@ -23,7 +23,6 @@ from lathe_chatter.nodes.recording_status import news, recording_status
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.topic_watch import TopicWatch
 from lathe_chatter.recording import RunWriter
-from lathe_chatter.recording.cut_session import Journal
 from lathe_chatter.recording.provenance import (
     IDENTITY,
     PARAMETERS,
@@ -32,13 +31,14 @@ from lathe_chatter.recording.provenance import (
     identity,
     parameter_values,
 )
-from lathe_chatter.recording.receive_stalls import Stalls
+from lathe_chatter.recording.receive_stalls import ReceiveStalls
+from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.samples.continuity import Joint
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""
-_DRAIN_PERIOD = 0.02
+_TAKE_PERIOD = 0.02
 """s between two times that what has arrived is taken."""
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
@@ -70,11 +70,11 @@ class RecorderNode(ParameterNode):
         self._writer: RunWriter | None = None
         self._watch: TopicWatch | None = None
         self._failure, self._runs = '', 0
-        self._journal, self._stalls = Journal(), Stalls()
+        self._log, self._stalls = RunLog(), ReceiveStalls()
         self._diagnostics = Diagnostics(self, 'run recorder')
-        recorder_services.offer(self)
+        recorder_services.create_services(self)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_DRAIN_PERIOD, self._drain, clock=steady)
+        self.create_timer(_TAKE_PERIOD, self._take, clock=steady)
         self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
         self.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
@@ -138,7 +138,7 @@ class RecorderNode(ParameterNode):
         self._failure = ''
         self._runs += 1
         self._watch = TopicWatch(self, values['topics'], self._writer, self._write)
-        self._journal, self._stalls = Journal(), Stalls()
+        self._log, self._stalls = RunLog(), ReceiveStalls()
         self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
         self._snapshots = RemoteParameters(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
@@ -161,12 +161,12 @@ class RecorderNode(ParameterNode):
         if self._writer is None or self._watch is None:
             return _NOTHING
         self._watch.end()
-        self._tell()
+        self._log_news()
         writer, self._writer = self._writer, None
         stalls = {STALLS: str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
         try:
             writer.note(RECEPTION, {**self._watch.reception(), **stalls})
-            writer.note(SUMMARY, closing_summary(self._journal, self._noted))
+            writer.note(SUMMARY, closing_summary(self._log, self._noted))
             writer.close()
         except OSError as error:
             self._failure = f'The end of {writer.folder} is not on disk: {reason_of(error)}.'
@@ -213,11 +213,11 @@ class RecorderNode(ParameterNode):
             self._watch.look(self._snapshots.want)
             self._snapshots.look()
 
-    def _drain(self) -> None:
+    def _take(self) -> None:
         """Take what has arrived."""
         if self._writer is not None and self._watch is not None:
             self._stalls.note(time.monotonic())
-            self._watch.drain()
+            self._watch.take()
 
     def _write(
         self, name: str, data: bytes, log_time: int, publish_time: int, number: int
@@ -228,14 +228,14 @@ class RecorderNode(ParameterNode):
                 name, data, log_time=log_time, publish_time=publish_time, sequence=number
             )
             kind = self._topics[name].topic.type
-            self._journal.hear(name, kind, data, log_time, publish_time)
+            self._log.receive(name, kind, data, log_time, publish_time)
 
     def _note_parameters(self, node: str, parameters: dict[str, Any]) -> None:
         """Keep what another node was asked for, and when it answered."""
         if self._writer is not None:
-            lives = self._noted.setdefault(node, [])
-            lives.append((parameters, time.time_ns()))
-            self._writer.note(PARAMETERS + node, parameter_values(lives))
+            answers = self._noted.setdefault(node, [])
+            answers.append((parameters, time.time_ns()))
+            self._writer.note(PARAMETERS + node, parameter_values(answers))
 
     # -- what is done with it --------------------------------------------------------------
 
@@ -248,19 +248,19 @@ class RecorderNode(ParameterNode):
         """
         if self._writer is None:
             return
-        self._drain()
-        self._tell()
+        self._take()
+        self._log_news()
         try:
             self._writer.commit_soon()
         except (OSError, LatheChatterError) as error:
             self._fail(error)
 
-    def _tell(self) -> None:
+    def _log_news(self) -> None:
         """Say from when there are samples, and where they are missing."""
-        for topic, heard in self._journal.samples.items():
-            if any(seam.joint is Joint.RESTART for seam in heard.seams):
+        for topic, received in self._log.samples.items():
+            if any(each.joint is Joint.RESTART for each in received.discontinuities):
                 self._snapshots.want_again(topic.removesuffix('/samples'))
-        for sentence in news(self._journal):
+        for sentence in news(self._log):
             self.get_logger().info(sentence)
 
     def _fail(self, error: Exception) -> None:
@@ -278,7 +278,7 @@ class RecorderNode(ParameterNode):
         self._diagnostics.publish([self._status()])
 
     def _status(self) -> Status:
-        return recording_status(self.run, self._failure, self._topics, self._journal, self._stalls)
+        return recording_status(self.run, self._failure, self._topics, self._log, self._stalls)
 
 
 def main() -> None:

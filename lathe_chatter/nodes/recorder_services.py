@@ -27,7 +27,7 @@ class Recorder(Protocol):
         """Create a service."""
 
 
-def offer(recorder: Recorder) -> None:
+def create_services(recorder: Recorder) -> None:
     """Create the services on a node."""
 
     def start(_request: Any, response: Any) -> Any:

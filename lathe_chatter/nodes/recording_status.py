@@ -7,8 +7,8 @@ from pathlib import Path
 
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
-from lathe_chatter.recording.cut_session import Journal, Seam
-from lathe_chatter.recording.receive_stalls import Stalls
+from lathe_chatter.recording.receive_stalls import ReceiveStalls
+from lathe_chatter.recording.run_log import Discontinuity, RunLog
 from lathe_chatter.samples.continuity import Joint
 
 
@@ -16,8 +16,8 @@ def recording_status(
     run: Path | None,
     failure: str,
     topics: Mapping[str, RecordedTopic],
-    journal: Journal,
-    stalls: Stalls,
+    log: RunLog,
+    stalls: ReceiveStalls,
 ) -> Status:
     """The status of a recorder.
 
@@ -25,7 +25,7 @@ def recording_status(
         run: Its folder; None while nothing is recorded.
         failure: Why a recording ended that should not have; empty where none did.
         topics: By name.
-        journal: Of the run.
+        log: Of the run.
         stalls: Of the recorder.
     """
     values = {
@@ -36,55 +36,55 @@ def recording_status(
         'stalls': str(stalls.count),
         'longest stall, s': f'{stalls.longest:.3g}',
     }
-    for name, heard in journal.samples.items():
+    for name, received in log.samples.items():
         values |= {
-            f'{name}: samples': str(heard.continuity.samples),
-            f'{name}: samples before the first': str(heard.head),
-            f'{name}: samples lost': str(heard.continuity.lost),
-            f'{name}: silences': str(heard.silences),
-            f'{name}: restarts of the lathe': str(heard.continuity.restarts),
+            f'{name}: samples': str(received.continuity.samples),
+            f'{name}: samples before the first': str(received.head),
+            f'{name}: samples lost': str(received.continuity.lost),
+            f'{name}: silences': str(received.silences),
+            f'{name}: restarts of the lathe': str(received.continuity.restarts),
         }
     if failure:
         return Status('recording', ERROR, failure, values)
-    complaints = '; '.join(_complaints(topics, journal))
+    complaints = '; '.join(_complaints(topics, log))
     if complaints:
         return Status('recording', WARN, complaints, values)
     return Status('recording', OK, 'recording' if run else 'not recording', values)
 
 
-def news(journal: Journal) -> Iterator[str]:
-    """Sentences about where samples began, began again or are missing; each is told once.
+def news(log: RunLog) -> Iterator[str]:
+    """Sentences about where samples began, began again or are missing; each is said once.
 
     Args:
-        journal: Of the run; the seams that are told are taken away.
+        log: Of the run; the discontinuities that are said are taken away.
     """
-    for name, heard in journal.samples.items():
-        gaps = [seam for seam in heard.seams if seam.joint is Joint.GAP]
-        for seam in heard.seams:
-            if seam.joint is not Joint.GAP:
-                yield f'{name} {_begins(seam)}.'
+    for name, received in log.samples.items():
+        gaps = [place for place in received.discontinuities if place.joint is Joint.GAP]
+        for place in received.discontinuities:
+            if place.joint is not Joint.GAP:
+                yield f'{name} {_begins(place)}.'
         if gaps:  # there may be many
-            missing = sum(seam.missing for seam in gaps)
+            missing = sum(place.missing for place in gaps)
             yield (
                 f'{name}: {missing} samples between {gaps[0].before:.6f} s and '
                 f'{gaps[-1].after:.6f} s did not come.'
             )
-        heard.seams.clear()
+        received.discontinuities.clear()
 
 
-def _begins(seam: Seam) -> str:
-    since = f'is recorded from {seam.after:.6f} s on'
-    if seam.joint is Joint.RESTART:
-        since = f'{since}, after the lathe started again at {seam.before:.6f} s'
-    return f'{since}, without the {seam.missing} samples before' if seam.missing else since
+def _begins(place: Discontinuity) -> str:
+    since = f'is recorded from {place.after:.6f} s on'
+    if place.joint is Joint.RESTART:
+        since = f'{since}, after the lathe started again at {place.before:.6f} s'
+    return f'{since}, without the {place.missing} samples before' if place.missing else since
 
 
-def _complaints(topics: Mapping[str, RecordedTopic], journal: Journal) -> Iterator[str]:
+def _complaints(topics: Mapping[str, RecordedTopic], log: RunLog) -> Iterator[str]:
     lost = [f'{topic.lost} of {name}' for name, topic in topics.items() if topic.lost]
     if lost:
         yield f'messages were lost: {", ".join(lost)}'
-    for name, heard in journal.samples.items():
-        if heard.continuity.lost:
-            yield f'{heard.continuity.lost} samples of {name} are missing'
-        if heard.complaint:
-            yield f'{name}: {heard.complaint}'
+    for name, received in log.samples.items():
+        if received.continuity.lost:
+            yield f'{received.continuity.lost} samples of {name} are missing'
+        if received.complaint:
+            yield f'{name}: {received.complaint}'

@@ -36,11 +36,11 @@ class TopicWatch:
         self._refused: set[str] = set()
         self._most_publishers: dict[str, int] = {}
 
-    def look(self, meet: Callable[[str, str], None]) -> None:
+    def look(self, on_publisher: Callable[[str, str], None]) -> None:
         """Subscribe to what has appeared, and follow the others.
 
         Args:
-            meet: Takes namespace and name of every node that publishes a wanted topic.
+            on_publisher: Takes namespace and name of every node that publishes a wanted topic.
         """
         for name in self._wanted:
             if name in self._refused:
@@ -51,16 +51,16 @@ class TopicWatch:
             elif offers:
                 self._join(name, offers)
             for offer in offers:
-                meet(offer.node_namespace, offer.node_name)
+                on_publisher(offer.node_namespace, offer.node_name)
             if len(offers) > self._most_publishers.get(name, 0):
                 self._most_publishers[name] = len(offers)
                 counts = {each: str(count) for each, count in self._most_publishers.items()}
                 self._writer.note(PUBLISHERS, counts)
 
-    def drain(self) -> None:
+    def take(self) -> None:
         """Take what has arrived."""
         for topic in self.topics.values():
-            topic.drain()
+            topic.take()
 
     def end(self) -> None:
         """Take what has arrived, and unsubscribe."""

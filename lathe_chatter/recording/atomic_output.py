@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 @contextmanager
-def whole_folder(path: Path) -> Iterator[None]:
+def atomic_folder(path: Path) -> Iterator[None]:
     """A folder to make that goes again if its making fails, so that a second try finds none.
 
     For copies alone: of a record, what there is of it is kept. A folder that was there before

@@ -17,7 +17,7 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError, ParameterError
-from lathe_chatter.recording.atomic_output import whole_folder
+from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.dataframes import UNITS, optional
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run, RunReadError
@@ -139,7 +139,7 @@ def unroll(
     parts = _Parts(run, chosen, progress)
     topic = chosen.topic or run.samples_topic()
     written, base, last = 0, 0, 0
-    with whole_folder(path), RunWriter(path) as writer:
+    with atomic_folder(path), RunWriter(path) as writer:
         topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != _TIME}
         for name in topics.values():
             writer.add_topic(topic_of_type(name, NUMBER_TYPE))

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.recording.cut_session import Journal
 from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
@@ -19,6 +18,7 @@ from lathe_chatter.recording.ros_messages import (
     samples_bytes,
     topic_of_type,
 )
+from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples.codec import SAMPLES_TYPE
@@ -65,7 +65,7 @@ class LatheRun:
         self._sequences: dict[str, int] = {}
         self._committed = time.monotonic()
         self._closed = False
-        self._journal, self._parameters = Journal(), dict(parameters)
+        self._log, self._parameters = RunLog(), dict(parameters)
         self._kinds: dict[str, str] = {}
         self.writer.note(IDENTITY, identity())
         self.writer.note(PARAMETERS + name, parameter_values([(parameters, self._begun)]))
@@ -76,9 +76,9 @@ class LatheRun:
         ):
             self._announce(topic, kind)
         announced = parameters_bytes(name, dict(parameters), self._begun)
-        self._write('/parameter_events', announced)
+        self._add('/parameter_events', announced)
 
-    def take(self, samples: Array) -> None:
+    def write(self, samples: Array) -> None:
         """Write a block of samples (n, 8), n > 0; every 0.25 s also put it all on disk.
 
         Raises:
@@ -87,20 +87,20 @@ class LatheRun:
         """
         if self._simulated:
             self._now = self._begun + round(float(samples[-1, 0]) * _SECOND)
-        self._write(self._samples, samples_bytes(samples))
+        self._add(self._samples, samples_bytes(samples))
         if time.monotonic() - self._committed > _COMMIT_PERIOD:
             self.commit()
 
-    def tell(self, sentence: str) -> None:
+    def log(self, sentence: str) -> None:
         """Write what happened to the cut, a sentence of `lathe_chatter.lathe.cut_events`."""
         logger = self.name.lstrip('/').replace('/', '.')
-        self._write('/rosout', log_bytes(logger, sentence, self._stamp()))
+        self._add('/rosout', log_bytes(logger, sentence, self._stamp()))
 
     def publish(self, topic: str, kind: str, **fields: Any) -> None:
         """Write a message of another topic, as `std_msgs/msg/Bool` with `data=True`."""
         if topic not in self._kinds:
             self._announce(topic, kind)
-        self._write(topic, message_bytes(kind, **fields))
+        self._add(topic, message_bytes(kind, **fields))
 
     def commit(self) -> None:
         """Have everything written so far put on disk.
@@ -121,8 +121,8 @@ class LatheRun:
         if self._closed:
             return
         self._closed = True
-        told = closing_summary(self._journal, {self.name: [(self._parameters, self._begun)]})
-        self.writer.note(SUMMARY, told)
+        summary = closing_summary(self._log, {self.name: [(self._parameters, self._begun)]})
+        self.writer.note(SUMMARY, summary)
         self.writer.close()
 
     def abandon(self) -> None:
@@ -145,8 +145,8 @@ class LatheRun:
     def _stamp(self) -> int:
         return self._now if self._simulated else time.time_ns()
 
-    def _write(self, topic: str, data: bytes) -> None:
+    def _add(self, topic: str, data: bytes) -> None:
         number = self._sequences[topic] = self._sequences.get(topic, 0) + 1
         stamp = self._stamp()
         self.writer.write(topic, data, log_time=stamp, publish_time=stamp, sequence=number)
-        self._journal.hear(topic, self._kinds[topic], data, stamp, stamp)
+        self._log.receive(topic, self._kinds[topic], data, stamp, stamp)

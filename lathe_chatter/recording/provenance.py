@@ -20,7 +20,7 @@ IDENTITY = 'lathe_chatter/made_by'
 PARAMETERS = 'lathe_chatter/parameters'
 """Name of the records of a node's parameters, followed by its full name; values as JSON.
 
-Of a node that was started again also those of its next lives, `parameters_2` and so on.
+Of a node that was started again also those of its next starts, `parameters_2` and so on.
 """
 
 RECEPTION = 'lathe_chatter/reception'
@@ -78,22 +78,22 @@ def identity() -> dict[str, str]:
     }
 
 
-def parameter_values(lives: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:
+def parameter_values(answers: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:
     """The values of a record of parameters.
 
     Args:
-        lives: The parameters of a node, and of the nodes of its name that came after it, each
-            with the time at which it told them, ns since the epoch.
+        answers: The parameters of a node, and of the nodes of its name that came after it, each
+            with the time at which it answered, ns since the epoch.
     """
     values: dict[str, str] = {}
-    for k, (parameters, log_time) in enumerate(lives):
+    for k, (parameters, log_time) in enumerate(answers):
         suffix = f'_{k + 1}' if k else ''
         values[f'parameters{suffix}'] = json.dumps(dict(parameters))
         values[f'log_time{suffix}'] = str(log_time)
     return values
 
 
-def lives_in(values: Mapping[str, str]) -> Iterator[tuple[dict[str, Any], int]]:
+def parameter_history(values: Mapping[str, str]) -> Iterator[tuple[dict[str, Any], int]]:
     """What `parameter_values` was given, as far as it is legible."""
     for name, text in values.items():
         if not name.startswith('parameters'):

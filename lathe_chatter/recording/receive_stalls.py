@@ -6,7 +6,7 @@ _STALL = 0.1
 """s between two times that messages are taken which count as a stall; usual are 0.02 s."""
 
 
-class Stalls:
+class ReceiveStalls:
     """Follows when messages are taken.
 
     Attributes:

@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
-from lathe_chatter.recording.atomic_output import whole_folder
+from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.completeness import lost_at_the_end
 from lathe_chatter.recording.mcap_reader import Damage
 from lathe_chatter.recording.provenance import RECOVERED
@@ -53,7 +53,7 @@ def recover(path: Path | str, output: Path) -> Recovery:
     saved: Counter[str] = Counter()
     last: dict[str, int] = {}
     damage: list[Damage] = [*old.damage]
-    with whole_folder(output), RunWriter(output) as writer:
+    with atomic_folder(output), RunWriter(output) as writer:
         for place, file in enumerate(old.files):
             if place:
                 writer.split()

@@ -1,4 +1,4 @@
-"""A lathe that does again what a record tells of it, beside the recorded samples."""
+"""A lathe that does again what a record says of it, beside the recorded samples."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ import numpy as np
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.cut_events import BEGINNING_AGAIN, Change, Knock
-from lathe_chatter.model import Cut
-from lathe_chatter.model.parameters import cut_from
-from lathe_chatter.recording.cut_log import Told
+from lathe_chatter.lathe.cut_events import Change, Knock
+from lathe_chatter.recording.cut_log import CutLog
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import Blocks
 
-_AT_ONCE = 50_000
+_MAX_SAMPLES = 50_000
 """Samples that are computed at once where the record has none."""
 
 
@@ -43,72 +41,56 @@ class ReplayError(LatheChatterError):
 
 
 class Replay:
-    """A lathe that does again what is told, sample by sample beside the record.
+    """A lathe that does again what was logged, sample by sample beside the record.
 
     Args:
-        told: What the record says of the lathe.
+        log: What the record says of the lathe.
 
     Attributes:
         compared: Samples that were equal.
-        whole: Whether the record says of the present act how it began.
+        has_beginning: Whether the record says of the present session how it began.
         logged: Whether the record says anything of what happened to the cut.
         after_gap: Whether samples are missing between the last that was equal and the next.
     """
 
-    def __init__(self, told: Told) -> None:
+    def __init__(self, log: CutLog) -> None:
         """Begin as the record says.
 
         Raises:
             ReplayError: If it says too little.
             ParameterError: If it says what no lathe can be.
         """
-        if not told.parameters:
+        if not log.parameters:
             raise ReplayError('The run does not say with what parameters the lathe was started.')
         self.compared = 0
         self.after_gap = False
-        self.logged = told.logged
-        self._told = told
-        self._act = -1
+        self.logged = log.logged
+        self._sessions = log.sessions
+        self._session = -1
         self._waiting: list[Change | Knock] = []
-        self._parameters = told.parameters
-        self._lathe = recorded_config(told.parameters).lathe()
+        self._lathe = recorded_config(log.parameters).lathe()
 
     def _begin(self, published: int) -> None:
-        """Begin the act of a block, at time zero, with the cut that those before it left.
+        """Begin the session of a block, at time zero.
 
         Args:
-            published: When the block was, ns since the epoch: acts may have passed without one.
+            published: When the block was, ns since the epoch: sessions may pass without one.
         """
-        acts, cut = self._told.acts, self._lathe.cut
-        for happened in self._waiting:  # no sample came after these
-            cut = _after(cut, happened)
-        self._act += 1
-        while self._act + 1 < len(acts) and acts[self._act + 1].begun <= published:
-            cut = self._started(cut)
-            for happened in acts[self._act].happenings:
-                cut = _after(cut, happened)
-            self._act += 1
-        if self._act >= len(acts):
+        sessions, self._session = self._sessions, self._session + 1
+        while self._session + 1 < len(sessions) and sessions[self._session + 1].begun <= published:
+            self._session += 1
+        if self._session >= len(sessions):
             raise ReplayError(
                 'Simulated time goes back, and the record does not say how the lathe began again.'
             )
-        cut = self._started(cut)
-        values = {name: getattr(cut, name) for name in Cut.__dataclass_fields__}
-        self._lathe = recorded_config({**self._parameters, **values}).lathe()
-        self.whole = bool(acts[self._act].beginning)
-        self._waiting = list(acts[self._act].happenings)
-
-    def _started(self, cut: Cut) -> Cut:
-        """The cut at time zero of the present act: as it was, or of a lathe started again."""
-        act = self._told.acts[self._act]
-        if not self._act or act.beginning == BEGINNING_AGAIN:
-            return cut
-        if not act.parameters:
+        session = sessions[self._session]
+        if not session.parameters:
             raise ReplayError(
                 'The lathe was started a second time, and with what parameters is not recorded.'
             )
-        self._parameters = act.parameters
-        return cut_from(act.parameters)
+        self._lathe = recorded_config(session.parameters).lathe()
+        self.has_beginning = bool(session.beginning)
+        self._waiting = list(session.events)
 
     def compare(self, blocks: Blocks) -> Difference | None:
         """Compare the blocks of some messages with what the lathe does; the first difference.
@@ -118,15 +100,15 @@ class Replay:
         """
         if blocks.columns != SAMPLE_COLUMNS:
             raise ReplayError('The samples have other columns than this lathe computes.')
-        for samples in self._pieces(blocks):
-            difference = self._compare_piece(samples)
+        for samples in self._stretches(blocks):
+            difference = self._compare_stretch(samples)
             if difference is not None:
                 return difference
             self.compared += len(samples)
             self.after_gap = False
         return None
 
-    def _pieces(self, blocks: Blocks) -> Iterator[Array]:
+    def _stretches(self, blocks: Blocks) -> Iterator[Array]:
         """Messages joined as far as their places follow each other; the lathe is at the first."""
         ends = np.cumsum(blocks.rows)
         begins = ends - blocks.rows
@@ -143,18 +125,18 @@ class Replay:
             place: Of the sample.
             published: When it was, ns since the epoch.
         """
-        if self._act < 0 or place < self._lathe.samples_taken:
+        if self._session < 0 or place < self._lathe.samples_taken:
             self._begin(published)
         while self._lathe.samples_taken < place:
             self.after_gap = self.compared > 0
-            self._cut(min(place - self._lathe.samples_taken, _AT_ONCE))
+            self._cut(min(place - self._lathe.samples_taken, _MAX_SAMPLES))
             if self._lathe.guard:
                 raise ReplayError(f'The lathe ends before the samples do. {self._lathe.guard}')
 
-    def _compare_piece(self, samples: Array) -> Difference | None:
+    def _compare_stretch(self, samples: Array) -> Difference | None:
         done = 0
         while done < len(samples):
-            computed = self._cut(min(len(samples) - done, _AT_ONCE))
+            computed = self._cut(min(len(samples) - done, _MAX_SAMPLES))
             recorded = np.ascontiguousarray(samples[done : done + len(computed)])
             wrong = np.argwhere(recorded.view(np.uint64) != computed.view(np.uint64))
             if len(wrong):
@@ -181,20 +163,15 @@ class Replay:
             samples = min(samples, until)
         return self._lathe.advance(samples)
 
-    def _when(self, happened: Change | Knock) -> int:
+    def _when(self, event: Change | Knock) -> int:
         """After how many samples it took effect: changes happen between two samples."""
-        return round(happened.time * self._lathe.sample_rate)
+        return round(event.time * self._lathe.sample_rate)
 
-    def _do(self, happened: Change | Knock) -> None:
-        if isinstance(happened, Knock):
-            self._lathe.knock(happened.impulse)
+    def _do(self, event: Change | Knock) -> None:
+        if isinstance(event, Knock):
+            self._lathe.knock(event.impulse)
         else:
-            self._lathe.retune(_after(self._lathe.cut, happened))
-
-
-def _after(cut: Cut, happened: Change | Knock) -> Cut:
-    """A cut after what happened to it."""
-    return cut.with_changes(**happened.new) if isinstance(happened, Change) else cut
+            self._lathe.retune(self._lathe.cut.with_changes(**event.new))
 
 
 def _places(blocks: Blocks, sample_rate: float) -> Integers:

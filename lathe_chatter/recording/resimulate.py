@@ -1,7 +1,7 @@
 """`resimulate`: compute a recorded run again from what it says, and compare every bit.
 
-A run tells the parameters of its lathe, and each change of the cut and each knock with its
-simulated time (changes.py). The lathe is deterministic, its noise included; so the samples are
+A run has the parameters of its lathe, and each change of the cut and each knock with its
+simulated time (cut_events.py). The lathe is deterministic, its noise included; so the samples are
 those that follow from the rest of the record, or somebody has altered the one or the other.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lathe_chatter.errors import LayoutError, ParameterError
-from lathe_chatter.recording.cut_log import told_by
+from lathe_chatter.recording.cut_log import read_cut_log
 from lathe_chatter.recording.provenance import IDENTITY, core_identity
 from lathe_chatter.recording.replay import Difference, Replay, ReplayError
 from lathe_chatter.recording.run import Run, RunReadError
@@ -61,9 +61,9 @@ def resimulate(run: Run) -> list[Resimulation]:
 
 def _resimulated(run: Run, topic: str) -> Resimulation:
     found = Resimulation(topic)
-    told = told_by(run, topic.removesuffix('/samples'))
+    log = read_cut_log(run, topic.removesuffix('/samples'))
     try:
-        replay = Replay(told)
+        replay = Replay(log)
     except (ReplayError, ParameterError) as error:
         found.obstacle = str(error)
         return found
@@ -122,7 +122,7 @@ def _excuse(run: Run, replay: Replay) -> str:
             'The record has nothing of the log of the lathe: whether its cut was changed is not '
             'known.'
         )
-    if not replay.whole and not replay.compared:
+    if not replay.has_beginning and not replay.compared:
         return (
             'The record does not begin with the cut: what was changed before it began is not '
             'known, so its samples cannot be computed.'

@@ -8,80 +8,70 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.cut_events import Change
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.parameters import cut_from, machine_from
-from lathe_chatter.recording.cut_session import Journal, SamplesHeard
+from lathe_chatter.recording.cut_log import CutSession
+from lathe_chatter.recording.run_log import RunLog, SamplesReceived
 
 SUMMARY = 'lathe_chatter/summary'
 """Name of the record; every value is JSON."""
 
 
 def closing_summary(
-    journal: Journal, parameters: Mapping[str, Sequence[tuple[Mapping[str, Any], int]]]
+    log: RunLog, parameters: Mapping[str, Sequence[tuple[Mapping[str, Any], int]]]
 ) -> dict[str, str]:
     """What to note at the end of a run.
 
     Args:
-        journal: Of the run.
-        parameters: Of lathes, by the full names of their nodes: what each told, and when, ns
+        log: Of the run.
+        parameters: Of lathes, by the full names of their nodes: what each said, and when, ns
             since the epoch.
     """
     values: dict[str, Any] = {
-        'messages': dict(sorted(journal.messages.items())),
-        'samples': {topic: _samples(heard) for topic, heard in journal.samples.items()},
-        'chatter': [
-            {'time': time, 'topic': topic, 'flag': up} for time, topic, up in journal.flags
-        ],
+        'messages': dict(sorted(log.messages.items())),
+        'samples': {topic: _samples(received) for topic, received in log.samples.items()},
+        'chatter': [{'time': time, 'topic': topic, 'flag': up} for time, topic, up in log.flags],
         'linear_model': {
-            topic: _verdicts(journal, topic, parameters.get(topic.removesuffix('/samples'), ()))
-            for topic in journal.samples
+            topic: _verdicts(log, topic, parameters.get(topic.removesuffix('/samples'), ()))
+            for topic in log.samples
         },
     }
     return {name: json.dumps(value) for name, value in values.items()}
 
 
-def _samples(heard: SamplesHeard) -> dict[str, Any]:
-    counted = heard.continuity
+def _samples(received: SamplesReceived) -> dict[str, Any]:
+    counted = received.continuity
     return {
         'samples': counted.samples,
-        'first': heard.first,
+        'first': received.first,
         'last': counted.last,
-        'head': heard.head,
+        'head': received.head,
         'lost': counted.lost,
         'gaps': counted.gaps,
         'restarts': counted.restarts,
-        'silences': heard.silences,
-        'longest_silence': heard.longest,
-        'complaint': heard.complaint,
+        'silences': received.silences,
+        'longest_silence': received.longest,
+        'complaint': received.complaint,
     }
 
 
 def _verdicts(
-    journal: Journal, topic: str, told: Sequence[tuple[Mapping[str, Any], int]]
+    log: RunLog, topic: str, noted: Sequence[tuple[Mapping[str, Any], int]]
 ) -> list[dict[str, Any]]:
     """Of each cut of a lathe, in order: what the linear model says of it."""
-    starts = journal.starts_of(topic.removesuffix('/samples'))
-    verdicts: list[dict[str, Any]] = []
-    for k, start in enumerate(starts):
-        since = start.begun if k else 0
-        until = starts[k + 1].begun if k + 1 < len(starts) else math.inf
-        parameters = next((values for values, at in told if since <= at < until), None)
-        if parameters is not None:
-            verdicts += _verdicts_since(parameters, start.changes)
-    return verdicts
+    cut_log = log.cut_log_of(topic.removesuffix('/samples'))
+    cut_log.assign_parameters(noted)
+    return [each for session in cut_log.sessions for each in _verdicts_in(session)]
 
 
-def _verdicts_since(
-    parameters: Mapping[str, Any], changes: Sequence[Change]
-) -> list[dict[str, Any]]:
-    """Of each cut since a start of a lathe."""
+def _verdicts_in(session: CutSession) -> list[dict[str, Any]]:
+    """Of each cut of a session."""
+    if not session.parameters:
+        return []
     try:
-        machine, cut = machine_from(parameters), cut_from(parameters)
-        for change in reversed(changes):  # the parameters may have been told after some
-            cut = cut.with_changes(**change.old)
+        machine, cut = machine_from(session.parameters), cut_from(session.parameters)
         verdicts = [_verdict(0.0, machine, cut)]
-        for change in changes:
+        for change in session.changes:
             cut = cut.with_changes(**change.new)
             verdicts.append(_verdict(change.time, machine, cut))
     except LatheChatterError as error:
@@ -94,7 +84,7 @@ def _verdict(time: float, machine: Machine, cut: Cut) -> dict[str, Any]:
     # Not at the top: the monitor and the recorder would load it at their start.
     from lathe_chatter.stability import rightmost_root
 
-    told: dict[str, Any] = {
+    verdict: dict[str, Any] = {
         'time': time,
         'spindle_speed_rpm': cut.spindle_speed_rpm,
         'depth_of_cut': cut.depth_of_cut,
@@ -103,9 +93,9 @@ def _verdict(time: float, machine: Machine, cut: Cut) -> dict[str, Any]:
         if seated and cut.bearing_contact is BearingContact.NONE:
             continue
         root = rightmost_root(machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated)
-        told[name] = {
+        verdict[name] = {
             'growth_rate': root.real,
             'frequency': root.imag / (2.0 * math.pi),
             'stable': root.real < 0.0,
         }
-    return told
+    return verdict

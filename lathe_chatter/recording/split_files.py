@@ -1,4 +1,4 @@
-"""The files of a run that is being written: pieces, what each begins with, and metadata.yaml."""
+"""The files of a run that is being written: topics, what each file begins with, metadata.yaml."""
 
 from __future__ import annotations
 
@@ -11,12 +11,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from mcap.records import Channel, Schema
+
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.recording.disk_sync import BackgroundSync
-from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
-from lathe_chatter.recording.metadata import FileCount, describe, dump, replace_file
-from lathe_chatter.recording.open_chunk import OpenChunk
-from lathe_chatter.recording.topic_records import TopicRecords
+from lathe_chatter.recording.disk_thread import FileSync
+from lathe_chatter.recording.mcap_writer import CommittedFile, Contents, OpenChunk, record_bytes
+from lathe_chatter.recording.metadata import (
+    FileCount,
+    Topic,
+    describe,
+    dump,
+    dump_qos,
+    replace_file,
+)
 
 CLOSED = 'lathe_chatter/closed'
 """Name of the MCAP metadata record that ends each file of a run; a killed recorder leaves none.
@@ -46,12 +53,69 @@ class DiskFullError(LatheChatterError):
         )
 
 
-class _Piece(NamedTuple):
+class TopicRecords(NamedTuple):
+    """A topic with its records.
+
+    Attributes:
+        topic: Which.
+        schema: Of its type; empty where a topic before has the same.
+        channel: The channel.
+    """
+
+    topic: Topic
+    schema: bytes
+    channel: bytes
+
+
+class TopicTable:
+    """Gives topics their numbers.
+
+    Attributes:
+        numbers: Of the channels, by name of topic.
+        described: Schema and channel as a chunk has them, by number of the channel.
+    """
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.numbers: dict[str, int] = {}
+        self.described: dict[int, bytes] = {}
+        self._schemas: dict[str, tuple[int, bytes]] = {}
+
+    def add(self, topic: Topic) -> TopicRecords | None:
+        """The records of a topic that is new; None for one that is known."""
+        if topic.name in self.numbers:
+            return None
+        known = topic.type in self._schemas
+        if not known:
+            number = len(self._schemas) + 1
+            data = topic.definition.encode()
+            schema = Schema(id=number, name=topic.type, encoding='ros2msg', data=data)
+            self._schemas[topic.type] = number, record_bytes(schema)
+        schema_number, schema_record = self._schemas[topic.type]
+        number = len(self.numbers) + 1
+        channel = record_bytes(
+            Channel(
+                id=number,
+                topic=topic.name,
+                message_encoding='cdr',
+                metadata={
+                    'offered_qos_profiles': dump_qos(topic.qos),
+                    'topic_type_hash': topic.type_hash,
+                },
+                schema_id=schema_number,
+            )
+        )
+        self.described[number] = schema_record + channel
+        self.numbers[topic.name] = number
+        return TopicRecords(topic, b'' if known else schema_record, channel)
+
+
+class _FinishedFile(NamedTuple):
     """A file of the run that is finished, or will be when the disk has caught up."""
 
     name: str
     contents: Contents
-    sync: BackgroundSync
+    sync: FileSync
 
 
 class RunFiles:
@@ -88,7 +152,7 @@ class RunFiles:
             folder.mkdir(parents=True)
         except FileExistsError:
             raise RunExistsError(folder) from None
-        self._pieces: list[_Piece] = []
+        self._finished: list[_FinishedFile] = []
         self._topics: list[TopicRecords] = []
         self._notes: dict[str, Mapping[str, str]] = {}
         self._described = True
@@ -138,7 +202,7 @@ class RunFiles:
         Raises:
             OSError: If the disk refuses.
         """
-        self._end_file(self._name(len(self._pieces) + 1))
+        self._end_file(self._name(len(self._finished) + 1))
         self._open_file()
 
     def close(self) -> None:
@@ -149,8 +213,8 @@ class RunFiles:
         """
         try:
             self._end_file('')
-            for piece in self._pieces:
-                piece.sync.join()
+            for file in self._finished:
+                file.sync.join()
         finally:
             self._describe()
 
@@ -173,23 +237,23 @@ class RunFiles:
     @property
     def safe_messages(self) -> int:
         """How many messages no loss of power can take any more."""
-        finished = sum(piece.sync.messages for piece in self._pieces)
-        return finished + (self._file.safe_messages if len(self._pieces) < self._begun else 0)
+        finished = sum(file.sync.messages for file in self._finished)
+        return finished + (self._file.safe_messages if len(self._finished) < self._begun else 0)
 
     def _name(self, number: int) -> str:
         return f'{self._folder.name}_{number}.mcap'
 
     def _files(self) -> list[tuple[str, Contents]]:
         """Every file with what it holds on disk; the last is the one that is written to."""
-        finished = [(piece.name, piece.contents) for piece in self._pieces]
+        finished = [(file.name, file.contents) for file in self._finished]
         if len(finished) < self._begun:
             finished.append((self._name(len(finished)), self._file.committed))
         return finished
 
     def _open_file(self) -> None:
         """Begin a file, with all that is known, and say so in the metadata."""
-        self._file = CommittedFile(self._folder / self._name(len(self._pieces)))
-        self._begun = len(self._pieces) + 1
+        self._file = CommittedFile(self._folder / self._name(len(self._finished)))
+        self._begun = len(self._finished) + 1
         # In the same order, so with the same numbers in every file.
         for records in self._topics:
             self._file.add_channel(records.schema, records.channel)
@@ -203,9 +267,9 @@ class RunFiles:
         counts = json.dumps(dict(sorted(self.counts.items())))
         self._file.add_metadata(CLOSED, {'next': next_name, 'messages': counts})
         self._file.add_metadata('rosbag2', {'serialized_metadata': self._description()})
-        name = self._name(len(self._pieces))
+        name = self._name(len(self._finished))
         sync = self._file.close(wait=False)
-        self._pieces.append(_Piece(name, self._file.committed, sync))
+        self._finished.append(_FinishedFile(name, self._file.committed, sync))
 
     def _description(self) -> str:
         files = [

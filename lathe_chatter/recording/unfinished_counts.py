@@ -29,7 +29,7 @@ class Taken(NamedTuple):
     last: int
 
 
-class Tally:
+class UnfinishedCounts:
     """Counts messages by the numbers of their channels.
 
     A disk that has no room for the counts, or a system that cannot map files, costs the counts

@@ -9,12 +9,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
-from lathe_chatter.recording.disk_thread import Background
+from lathe_chatter.recording.disk_thread import DiskThread
+from lathe_chatter.recording.mcap_writer import OpenChunk
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.open_chunk import OpenChunk
-from lathe_chatter.recording.split_files import CLOSED, DiskFullError, RunExistsError, RunFiles
-from lathe_chatter.recording.topic_records import TopicTable
-from lathe_chatter.recording.unfinished_counts import Tally
+from lathe_chatter.recording.split_files import (
+    CLOSED,
+    DiskFullError,
+    RunExistsError,
+    RunFiles,
+    TopicTable,
+)
+from lathe_chatter.recording.unfinished_counts import UnfinishedCounts
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
 
@@ -60,17 +65,17 @@ class RunWriter:
             split_duration=split_duration,
             split_size=split_size,
         )
-        self._tally = Tally(folder)
+        self._counts = UnfinishedCounts(folder)
         self._topics = TopicTable()
         self._chunk = OpenChunk(self._topics.described)
         self._closed = False
-        self._background = Background('run writer')
+        self._thread = DiskThread('run writer')
 
     def add_topic(self, topic: Topic) -> None:
         """Announce a topic before its first message; a second time changes nothing."""
         records = self._topics.add(topic)
         if records is not None:
-            self._background.soon(lambda: self._files.add_topic(records))
+            self._thread.do_later(lambda: self._files.add_topic(records))
 
     def write(
         self, name: str, data: bytes, *, log_time: int, publish_time: int, sequence: int = 0
@@ -86,7 +91,7 @@ class RunWriter:
         """
         chunk, channel = self._chunk, self._topics.numbers[name]
         chunk.add_message(channel, log_time, publish_time, sequence, data)
-        self._tally.count(channel, log_time)
+        self._counts.count(channel, log_time)
         if chunk.size > _CHUNK_SIZE:
             self._send_chunk()
 
@@ -100,12 +105,12 @@ class RunWriter:
         """
         self._send_chunk()
         kept = dict(values)
-        self._background.soon(lambda: self._files.note(name, kept))
+        self._thread.do_later(lambda: self._files.note(name, kept))
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Attach a file of another kind, a scenario for instance."""
         self._send_chunk()
-        self._background.soon(lambda: self._files.attach(name, media_type, data))
+        self._thread.do_later(lambda: self._files.attach(name, media_type, data))
 
     def attach_file(self, file: Path) -> None:
         """Attach a file as it is.
@@ -124,9 +129,9 @@ class RunWriter:
                 so far is on it.
             OSError: If the disk refuses; the file stays as the commit before left it.
         """
-        self._background.check()
+        self._thread.check()
         self._send_chunk()
-        self._background.now(self._files.commit)
+        self._thread.do_now(self._files.commit)
 
     def commit_soon(self) -> None:
         """Commit without waiting for it, some milliseconds from now.
@@ -135,9 +140,9 @@ class RunWriter:
             DiskFullError: As `commit`, of a commit that was asked for before.
             OSError: Likewise.
         """
-        self._background.check()
+        self._thread.check()
         self._send_chunk()
-        self._background.soon(self._files.commit)
+        self._thread.do_later(self._files.commit)
 
     def split(self) -> None:
         """Go on in a new file; every message is in the one or the other.
@@ -146,7 +151,7 @@ class RunWriter:
             OSError: If the disk refuses.
         """
         self._send_chunk()
-        self._background.now(self._files.split)
+        self._thread.do_now(self._files.split)
 
     def close(self) -> None:
         """Finish the files and the metadata; a second time does nothing.
@@ -160,20 +165,20 @@ class RunWriter:
         self._send_chunk()
         finished = False
         try:
-            self._background.now(self._files.close)
+            self._thread.do_now(self._files.close)
             finished = True
         finally:
-            self._background.end()
-            self._tally.close(finished=finished)
+            self._thread.end()
+            self._counts.close(finished=finished)
 
     def abandon(self) -> None:
         """Leave everything as the last commit left it: the disk takes no more."""
         if self._closed:
             return
         self._closed = True
-        self._background.now(self._files.abandon)
-        self._background.end()
-        self._tally.close(finished=False)
+        self._thread.do_now(self._files.abandon)
+        self._thread.end()
+        self._counts.close(finished=False)
 
     def __enter__(self) -> RunWriter:  # noqa: PYI034 -- Self needs Python 3.11
         """The folder and its first file are there."""
@@ -202,4 +207,4 @@ class RunWriter:
         """Hand the messages gathered so far to the thread."""
         if self._chunk.has_messages:
             chunk, self._chunk = self._chunk, OpenChunk(self._topics.described)
-            self._background.soon(lambda: self._files.add_chunk(chunk))
+            self._thread.do_later(lambda: self._files.add_chunk(chunk))

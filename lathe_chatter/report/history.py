@@ -20,7 +20,7 @@ from lathe_chatter.lathe.cut_events import Change, Knock
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.recording import Run, read_run
-from lathe_chatter.recording.cut_log import told_by
+from lathe_chatter.recording.cut_log import read_cut_log
 from lathe_chatter.recording.run import Samples
 
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
@@ -107,18 +107,20 @@ def read_history(path: Path) -> History:
     run = read_run(path)
     samples = run.samples()
     lathe = _topic(run, '/samples').removesuffix('/samples')
-    told = told_by(run, lathe)
+    log = read_cut_log(run, lathe)
     estimates = {name: _series(run, samples, f'/{name}') for name in _ESTIMATES}
     return History(
         path=Path(path),
-        machine=machine_from(told.parameters),
-        start=cut_from(told.parameters),
+        machine=machine_from(log.parameters),
+        start=cut_from(log.parameters),
         samples=samples.columns,
-        changes=list(told.changes),
-        knocks=[each for act in told.acts for each in act.happenings if isinstance(each, Knock)],
+        changes=list(log.changes),
+        knocks=[
+            each for session in log.sessions for each in session.events if isinstance(each, Knock)
+        ],
         flags=_flags(run, samples, estimates),
         estimates=estimates,
-        tool_leaves_cut=bool(told.parameters.get('tool_leaves_cut', True)),
+        tool_leaves_cut=bool(log.parameters.get('tool_leaves_cut', True)),
     )
 
 

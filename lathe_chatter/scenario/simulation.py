@@ -84,7 +84,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
     config = config_from(scenario.parameters)
     lathe = config.lathe()
     with LatheRun(folder, config.parameters(), simulated=True) as run:
-        run.tell(BEGINNING)
+        run.log(BEGINNING)
         simulation = _Simulation(lathe, run, scenario, knocks, tell)
         if monitor:
             simulation.watch(ChatterDetector(config.machine))
@@ -137,7 +137,7 @@ class _Simulation:
             return False
         samples = self._lathe.advance(self._next_stop() - now)
         if len(samples):
-            self._run.take(samples)
+            self._run.write(samples)
             if self._detector is not None:
                 self._hear(self._detector.update(samples, SAMPLE_COLUMNS))
         return not self._lathe.guard
@@ -169,11 +169,11 @@ class _Simulation:
         sentence = change_sentence(self._lathe.time, self._lathe.cut, cut)
         self._lathe.retune(cut)
         if sentence:
-            self._run.tell(sentence)
+            self._run.log(sentence)
         self._tell(self._lathe.time, str(replace(step, changes=meant)))
 
     def _knock(self, impulse: float) -> None:
-        self._run.tell(knock_sentence(self._lathe.time, impulse))
+        self._run.log(knock_sentence(self._lathe.time, impulse))
         self._lathe.knock(impulse)
         self._tell(self._lathe.time, f'knock of {impulse:g} N s')
 

@@ -58,7 +58,7 @@ def test_a_run_that_was_altered_is_found_out_by_computing_it_again(
             for k in range(20):
                 samples = lathe.advance(20)
                 samples[4, 6] += change * (k == 9)
-                run.take(samples)
+                run.write(samples)
     assert main(['verify', str(tmp_path / 'true'), '--resimulate']) == 0
     assert 'all 400 samples were computed again and are equal' in capsys.readouterr().out
     assert main(['verify', str(tmp_path / 'altered')]) == 0

@@ -17,7 +17,7 @@ from support.node_bench import LATCHED, Bench
 from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
 from lathe_chatter.recording import read_run, resimulate, verify
-from lathe_chatter.recording.provenance import PARAMETERS, lives_in
+from lathe_chatter.recording.provenance import PARAMETERS, parameter_history
 from lathe_chatter.recording.run_summary import SUMMARY
 
 CHATTER = ('depth_of_cut:=0.001', 'bearing_contact:=none')
@@ -81,7 +81,7 @@ def test_a_killed_lathe_is_missed_and_the_next_one_followed(cell: Cell) -> None:
 
     def lives() -> list[Any]:
         """The lathes of whose parameters the run knows."""
-        return [*lives_in(noted(cell.run(), f'{PARAMETERS}/lathe'))]
+        return [*parameter_history(noted(cell.run(), f'{PARAMETERS}/lathe'))]
 
     cell.wait(lives, 'the parameters')
     since, known = reports.count(), len(cell.states)

@@ -33,7 +33,7 @@ def folder(tmp_path: Path, samples: Array) -> Path:
     """A run in which one block is missing."""
     with LatheRun(tmp_path / 'run', parameters_of(VirtualLathe())) as run:
         for block in samples.reshape(BLOCKS - 1, ROWS, -1):
-            run.take(block)
+            run.write(block)
     return tmp_path / 'run'
 
 
@@ -84,8 +84,8 @@ def test_unrolled_each_sample_is_a_message_at_its_simulated_time(
 
 def test_unrolled_stamps_go_on_where_simulated_time_goes_back(tmp_path: Path) -> None:
     with LatheRun(tmp_path / 'run', parameters_of(VirtualLathe())) as run:
-        run.take(VirtualLathe().advance(3))
-        run.take(VirtualLathe().advance(3))
+        run.write(VirtualLathe().advance(3))
+        run.write(VirtualLathe().advance(3))
     assert main(['export', str(tmp_path / 'run'), '--unrolled', '--columns', 'cutting_force']) == 0
     raw = read_run(tmp_path / 'run-unrolled').raw_messages()
     assert [each.log_time for each in raw] == [k * 100_000 for k in (1, 2, 3, 4, 5, 6)]

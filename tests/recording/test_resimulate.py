@@ -45,19 +45,19 @@ def play(
         if made_by is not None:
             run.writer.note(IDENTITY, made_by)
         if beginning:
-            run.tell(beginning)
+            run.log(beginning)
         for k in range(ticks):
             if k in (30, 55):
                 speed, depth = (3333.3 + k, 0.0007 + 1e-5 * k / 3.0)
                 cut = lathe.cut.with_changes(spindle_speed_rpm=speed, depth_of_cut=depth)
-                run.tell(change_sentence(lathe.time, lathe.cut, cut))
+                run.log(change_sentence(lathe.time, lathe.cut, cut))
                 lathe.retune(cut)
             if k == 40:
-                run.tell(knock_sentence(lathe.time, 1.0 / 300.0))
+                run.log(knock_sentence(lathe.time, 1.0 / 300.0))
                 lathe.knock(1.0 / 300.0)
             samples = lathe.advance(TICK)
             if k >= first:
-                run.take(alter(k, samples))
+                run.write(alter(k, samples))
 
 
 def again(folder: Path) -> Resimulation:
@@ -145,40 +145,41 @@ def test_a_reset_begins_again(tmp_path: Path) -> None:
     lathe = VirtualLathe(cut=Cut(force_noise=1e-3), seed=3)
     parameters = parameters_of(lathe)
     with LatheRun(tmp_path / 'run', parameters) as run:
-        run.tell(BEGINNING)
-        run.take(lathe.advance(400))
+        run.log(BEGINNING)
+        run.write(lathe.advance(400))
         deeper = lathe.cut.with_changes(depth_of_cut=0.0008)
-        run.tell(change_sentence(lathe.time, lathe.cut, deeper))
-        run.tell(BEGINNING_AGAIN)
+        run.log(change_sentence(lathe.time, lathe.cut, deeper))
+        run.log(BEGINNING_AGAIN)
         lathe = recorded_config({**parameters, 'depth_of_cut': 0.0008}).lathe()
-        run.take(lathe.advance(300))
+        run.write(lathe.advance(300))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=700)
 
 
-@pytest.mark.parametrize('asked', [True, False])
+@pytest.mark.parametrize(('asked', 'from_name'), [(True, 9), (True, 0), (False, 0), (False, 9)])
 def test_a_lathe_that_was_started_again_is_computed_with_its_own_parameters(
-    asked: bool, tmp_path: Path
+    asked: bool, from_name: int, tmp_path: Path
 ) -> None:
     first = VirtualLathe(cut=Cut(force_noise=1e-3), seed=3)
     second = VirtualLathe(Machine(Mode(0.06, 700.0, 0.03)), Cut(7000.0, 0.0007), seed=4)
     deeper = second.cut.with_changes(depth_of_cut=0.0008)
     with LatheRun(tmp_path / 'run', parameters_of(first)) as run:
-        run.tell(BEGINNING)
-        run.take(first.advance(400))
+        run.log(BEGINNING)
+        run.write(first.advance(400))
         told = [(parameters_of(first), time.time_ns())]
         # It is killed, and started with other words: it declares before it begins.
-        declared = parameters_bytes('/lathe', parameters_of(second), time.time_ns())
-        run._write('/parameter_events', declared)
-        run.tell(BEGINNING)
-        run.take(second.advance(200))
-        run.tell(change_sentence(second.time, second.cut, deeper))
+        names = [*parameters_of(second).items()][from_name:]  # the recorder may have come late
+        declared = parameters_bytes('/lathe', dict(names), time.time_ns())
+        run._add('/parameter_events', declared)
+        run.log(BEGINNING)
+        run.write(second.advance(200))
+        run.log(change_sentence(second.time, second.cut, deeper))
         second.retune(deeper)
-        run.take(second.advance(100))
+        run.write(second.advance(100))
         if asked:
             told.append((parameters_of(second), time.time_ns()))
         run.writer.note(f'{PARAMETERS}/lathe', parameter_values(told))
     found = again(tmp_path / 'run')
-    if asked:
+    if asked or not from_name:
         assert found == Resimulation('/lathe/samples', compared=700)
     else:
         assert found.compared == 400
@@ -205,12 +206,12 @@ def test_a_change_that_may_be_in_a_gap_is_no_alteration(tmp_path: Path) -> None:
     """The samples about the change are missing, and its sentence too."""
     lathe = VirtualLathe()
     with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
-        run.tell(BEGINNING)
-        run.take(lathe.advance(400))
+        run.log(BEGINNING)
+        run.write(lathe.advance(400))
         lathe.advance(200)
         lathe.retune(lathe.cut.with_changes(depth_of_cut=0.0008))
         lathe.advance(200)
-        run.take(lathe.advance(400))
+        run.write(lathe.advance(400))
     found = again(tmp_path / 'run')
     assert found.compared == 400
     assert found.difference is not None
@@ -221,9 +222,9 @@ def test_a_change_that_may_be_in_a_gap_is_no_alteration(tmp_path: Path) -> None:
 def test_without_a_log_a_changed_cut_is_no_alteration(tmp_path: Path) -> None:
     lathe = VirtualLathe()
     with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
-        run.take(lathe.advance(400))
+        run.write(lathe.advance(400))
         lathe.retune(lathe.cut.with_changes(depth_of_cut=0.0008))
-        run.take(lathe.advance(400))
+        run.write(lathe.advance(400))
     found = again(tmp_path / 'run')
     assert found.compared == 400
     assert found.obstacle.startswith('The record has nothing of the log of the lathe')
@@ -236,15 +237,15 @@ def test_two_lathes_in_one_run_are_judged_each_by_its_own_record(tmp_path: Path)
     }
     for name, lathe in runs.items():
         with LatheRun(tmp_path / name[1:6], parameters_of(lathe), name=name) as run:
-            run.tell(BEGINNING)
+            run.log(BEGINNING)
             for k in range(20):
                 if k == 7:
                     deeper = lathe.cut.with_changes(depth_of_cut=lathe.cut.depth_of_cut + 1e-4)
-                    run.tell(change_sentence(lathe.time, lathe.cut, deeper))
+                    run.log(change_sentence(lathe.time, lathe.cut, deeper))
                     lathe.retune(deeper)
                 samples = lathe.advance(TICK)
                 samples[3, 4] += 1e-18 * (name == '/cell2/lathe' and k == 9)
-                run.take(samples)
+                run.write(samples)
     with RunWriter(tmp_path / 'both') as writer:
         for cell in ('cell1', 'cell2'):
             one = read_run(tmp_path / cell)
@@ -268,25 +269,25 @@ def test_what_happens_between_two_resets_or_in_a_pause_is_no_obstacle(tmp_path: 
     lathe = VirtualLathe(cut=Cut(sensor_noise=1e-8), seed=2)
     parameters = parameters_of(lathe)
     with LatheRun(tmp_path / 'run', parameters) as run:
-        run.tell(BEGINNING)
-        run.take(lathe.advance(200))
+        run.log(BEGINNING)
+        run.write(lathe.advance(200))
         for depth in (0.0008, 0.0004, 0.0006):  # while paused, one after the other
             changed = lathe.cut.with_changes(depth_of_cut=depth)
-            run.tell(change_sentence(lathe.time, lathe.cut, changed))
+            run.log(change_sentence(lathe.time, lathe.cut, changed))
             lathe.retune(changed)
-        run.take(lathe.advance(200))
+        run.write(lathe.advance(200))
         for depth in (0.0005, 0.0009, 0.0007):  # reset, changed and reset before a sample came
-            run.tell(BEGINNING_AGAIN)
+            run.log(BEGINNING_AGAIN)
             changed = lathe.cut.with_changes(depth_of_cut=depth)
-            run.tell(change_sentence(0.0, lathe.cut, changed))
+            run.log(change_sentence(0.0, lathe.cut, changed))
             lathe = recorded_config({**parameters, 'depth_of_cut': depth}).lathe()
-        run.take(lathe.advance(100))
-        run.tell(BEGINNING_AGAIN)
+        run.write(lathe.advance(100))
+        run.log(BEGINNING_AGAIN)
         lathe = recorded_config({**parameters, 'depth_of_cut': 0.0007}).lathe()
-        run.take(lathe.advance(100))
-        run.tell(change_sentence(lathe.time, lathe.cut, Cut(sensor_noise=1e-8)))
+        run.write(lathe.advance(100))
+        run.log(change_sentence(lathe.time, lathe.cut, Cut(sensor_noise=1e-8)))
         lathe.retune(Cut(sensor_noise=1e-8))
-        run.take(lathe.advance(200))
+        run.write(lathe.advance(200))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=800)
 
 
@@ -294,12 +295,12 @@ def test_a_reset_before_the_first_sample_that_was_recorded(tmp_path: Path) -> No
     lathe = VirtualLathe(cut=Cut(force_noise=1e-3))
     deeper = lathe.cut.with_changes(depth_of_cut=0.0008)
     with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
-        run.tell(BEGINNING)
-        run.tell(change_sentence(0.3, lathe.cut, deeper))
-        run.tell(BEGINNING_AGAIN)
+        run.log(BEGINNING)
+        run.log(change_sentence(0.3, lathe.cut, deeper))
+        run.log(BEGINNING_AGAIN)
         lathe = VirtualLathe(cut=deeper)
         lathe.advance(60)  # not recorded either
-        run.take(lathe.advance(100))
+        run.write(lathe.advance(100))
     assert again(tmp_path / 'run') == Resimulation('/lathe/samples', compared=100)
 
 
@@ -321,18 +322,18 @@ def test_every_change_of_a_cut_can_be_told_and_done_again(tmp_path: Path) -> Non
     assert set(choices) == set(Cut.__dataclass_fields__)
     lathe = VirtualLathe(seed=9, spindle_acceleration=5e4)
     with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
-        run.tell(BEGINNING)
+        run.log(BEGINNING)
         for _ in range(120):
             if generator.uniform() < 0.5:
                 names = generator.choice(list(choices), size=2, replace=False).tolist()
                 cut = lathe.cut.with_changes(**{name: choices[name]() for name in names})
                 if sentence := change_sentence(lathe.time, lathe.cut, cut):
-                    run.tell(sentence)
+                    run.log(sentence)
                 lathe.retune(cut)
             if generator.uniform() < 0.1:
                 impulse = float(generator.normal(scale=1e-3))
-                run.tell(knock_sentence(lathe.time, impulse))
+                run.log(knock_sentence(lathe.time, impulse))
                 lathe.knock(impulse)
-            run.take(lathe.advance(int(generator.integers(1, 60))))
+            run.write(lathe.advance(int(generator.integers(1, 60))))
     found = again(tmp_path / 'run')
     assert found == Resimulation('/lathe/samples', compared=lathe.samples_taken)

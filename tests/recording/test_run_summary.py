@@ -13,8 +13,8 @@ from lathe_chatter.lathe.cut_events import BEGINNING, change_sentence
 from lathe_chatter.model import Cut
 from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
-from lathe_chatter.recording.cut_session import Journal
 from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, samples_bytes
+from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 
@@ -29,14 +29,14 @@ def summary_of(folder: Path) -> dict[str, Any]:
 def test_counts_samples_flags_and_the_linear_models_verdict_are_in_the_run(tmp_path: Path) -> None:
     lathe = VirtualLathe()
     with LatheRun(tmp_path / 'run', parameters_of(lathe)) as run:
-        run.tell(BEGINNING)
+        run.log(BEGINNING)
         for k in range(50):
             if k == 20:
                 run.publish('/chatter_monitor/chatter', 'std_msgs/msg/Bool', data=True)
                 deeper = lathe.cut.with_changes(depth_of_cut=0.001)
-                run.tell(change_sentence(lathe.time, lathe.cut, deeper))
+                run.log(change_sentence(lathe.time, lathe.cut, deeper))
                 lathe.retune(deeper)
-            run.take(lathe.advance(20))
+            run.write(lathe.advance(20))
     told = summary_of(tmp_path / 'run')
     assert told['messages'] == {
         '/chatter_monitor/chatter': 1, '/lathe/samples': 50, '/parameter_events': 1, '/rosout': 2,
@@ -55,7 +55,7 @@ def test_counts_samples_flags_and_the_linear_models_verdict_are_in_the_run(tmp_p
 
 
 def test_a_lathe_that_was_started_again_is_judged_by_its_own_parameters() -> None:
-    journal = Journal()
+    run_log = RunLog()
     told = [(parameters_of(VirtualLathe()), 2), (parameters_of(VirtualLathe(cut=Cut(7000.0))), 12)]
     deeper = Cut(7000.0, 0.001)
     for at, sentence in (
@@ -64,50 +64,50 @@ def test_a_lathe_that_was_started_again_is_judged_by_its_own_parameters() -> Non
         (13, change_sentence(0.5, Cut(7000.0), deeper)),
     ):
         data = log_bytes('lathe', sentence, at)
-        journal.hear('/rosout', LOG_TYPE, data, at, at)
-    heard(journal, VirtualLathe(), at=14)
-    values = closing_summary(journal, {'/lathe': told})
+        run_log.receive('/rosout', LOG_TYPE, data, at, at)
+    receive(run_log, VirtualLathe(), at=14)
+    values = closing_summary(run_log, {'/lathe': told})
     verdicts = json.loads(values['linear_model'])['/lathe/samples']
     cuts = [(v['time'], v['spindle_speed_rpm'], v['depth_of_cut']) for v in verdicts]
     assert cuts == [(0.0, 3000.0, 0.0005), (0.0, 7000.0, 0.0005), (0.5, 7000.0, 0.001)]
 
 
-def heard(journal: Journal, lathe: VirtualLathe, *, at: int) -> None:
+def receive(run_log: RunLog, lathe: VirtualLathe, *, at: int) -> None:
     data = samples_bytes(lathe.advance(20))
-    journal.hear('/lathe/samples', SAMPLES_TYPE, data, at, at)
+    run_log.receive('/lathe/samples', SAMPLES_TYPE, data, at, at)
 
 
 def test_what_is_missing_is_counted_by_the_times_of_the_samples() -> None:
-    journal, lathe = Journal(), VirtualLathe()
+    run_log, lathe = RunLog(), VirtualLathe()
     lathe.advance(140)
     for k in range(60):
         if k == 30:
             lathe.advance(60)
-        heard(journal, lathe, at=k * TICK)
-    samples = journal.samples['/lathe/samples']
+        receive(run_log, lathe, at=k * TICK)
+    samples = run_log.samples['/lathe/samples']
     assert samples.head == 140
     assert (samples.continuity.lost, samples.continuity.gaps) == (60, 1)
     assert samples.silences == 0
 
 
 def test_silence_is_noticed_where_blocks_come_often_and_not_where_they_never_did() -> None:
-    journal, lathe = Journal(), VirtualLathe()
+    run_log, lathe = RunLog(), VirtualLathe()
     for k in range(60):
-        heard(journal, lathe, at=k * TICK + (k >= 40) * 500_000_000)
-    samples = journal.samples['/lathe/samples']
+        receive(run_log, lathe, at=k * TICK + (k >= 40) * 500_000_000)
+    samples = run_log.samples['/lathe/samples']
     assert (samples.silences, samples.longest) == (1, pytest.approx(0.502))
-    slow = Journal()
+    slow = RunLog()
     for k in range(60):
-        heard(slow, lathe, at=k * 200_000_000)
+        receive(slow, lathe, at=k * 200_000_000)
     assert slow.samples['/lathe/samples'].silences == 0
 
 
 def test_a_message_that_is_no_block_is_told_and_harms_nothing() -> None:
-    journal, lathe = Journal(), VirtualLathe()
-    heard(journal, lathe, at=0)
-    journal.hear('/lathe/samples', SAMPLES_TYPE, b'\x00\x01\x00\x00nonsense', 1, 1)
-    journal.hear('/lathe/samples', SAMPLES_TYPE, samples_bytes(lathe.advance(20))[:-1], 2, 2)
-    assert 'cut off' in journal.samples['/lathe/samples'].complaint
-    heard(journal, lathe, at=3)
-    assert journal.samples['/lathe/samples'].continuity.samples == 40
-    assert journal.messages['/lathe/samples'] == 4
+    run_log, lathe = RunLog(), VirtualLathe()
+    receive(run_log, lathe, at=0)
+    run_log.receive('/lathe/samples', SAMPLES_TYPE, b'\x00\x01\x00\x00nonsense', 1, 1)
+    run_log.receive('/lathe/samples', SAMPLES_TYPE, samples_bytes(lathe.advance(20))[:-1], 2, 2)
+    assert 'cut off' in run_log.samples['/lathe/samples'].complaint
+    receive(run_log, lathe, at=3)
+    assert run_log.samples['/lathe/samples'].continuity.samples == 40
+    assert run_log.messages['/lathe/samples'] == 4

@@ -19,7 +19,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     folder = tmp_path_factory.mktemp('choice') / 'run'
     lathe = VirtualLathe()
     with LatheRun(folder, parameters_of(lathe)) as record:
-        record.take(lathe.advance(100))
+        record.write(lathe.advance(100))
     return read_run(folder)
 
 

@@ -11,7 +11,7 @@ import pytest
 from support.recorded import number, topic
 
 from lathe_chatter.recording import RunWriter, recover, verify
-from lathe_chatter.recording.unfinished_counts import FILE_NAME, Tally, taken
+from lathe_chatter.recording.unfinished_counts import FILE_NAME, UnfinishedCounts, taken
 
 TESTS = Path(__file__).resolve().parents[1]
 CHILD = """
@@ -96,14 +96,14 @@ def test_counts_that_are_damaged_tell_nothing(data: bytes, tmp_path: Path) -> No
 
 def test_where_counts_cannot_be_kept_nothing_else_fails(tmp_path: Path) -> None:
     (tmp_path / FILE_NAME).write_bytes(b'of another')
-    tally = Tally(tmp_path)
-    tally.count(1, 7)
-    tally.close(finished=True)
+    counts = UnfinishedCounts(tmp_path)
+    counts.count(1, 7)
+    counts.close(finished=True)
     assert (tmp_path / FILE_NAME).read_bytes() == b'of another'
 
 
 def test_channels_beyond_the_page_are_not_counted(tmp_path: Path) -> None:
-    tally = Tally(tmp_path)
+    counts = UnfinishedCounts(tmp_path)
     for channel in (0, 1, 4094, 4095, 65535):
-        tally.count(channel, 5)
+        counts.count(channel, 5)
     assert set(taken(tmp_path)) == {0, 1, 4094}

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.lathe.cut_events import BEGINNING, Change, parse_change
+from lathe_chatter.recording.cut_log import CutLog, logger_of
 from lathe_chatter.recording.ros_messages import LOG_TYPE, types
 from lathe_chatter.recording.sample_series import missing_in
 from lathe_chatter.samples.codec import SAMPLES_TYPE, Layout, layout_of
@@ -23,17 +23,17 @@ from lathe_chatter.samples.continuity import Continuity, Joint
 FLAG_TYPE = 'std_msgs/msg/Bool'
 _FLAG_BYTE = 4
 """Where the truth is in a serialised Bool, after the encapsulation."""
-_UNTOLD = 1000
-"""Seams that are kept for who tells of them."""
-_REMEMBERED = 1000
+_MAX_DISCONTINUITIES = 1000
+"""Discontinuities that are kept for who asks for them."""
+_MAX_BLOCKS = 1000
 """Blocks about which it is known when they came, to date other messages by."""
-_SILENCE = 0.1
+_MIN_SILENCE = 0.1
 """s without a block that count as silence, where blocks usually come more often."""
-_SLOWER = 10.0
+_SILENCE_RATIO = 10.0
 """So many times longer than usual must a silence be."""
 
 
-class Seam(NamedTuple):
+class Discontinuity(NamedTuple):
     """Where samples do not simply follow those before.
 
     Attributes:
@@ -50,7 +50,7 @@ class Seam(NamedTuple):
 
 
 @dataclass
-class SamplesHeard:
+class SamplesReceived:
     """The samples of one lathe, by their own times.
 
     Attributes:
@@ -60,8 +60,8 @@ class SamplesHeard:
         silences: How often it published nothing for much longer than usual.
         longest: The longest time from one block to the next, s.
         complaint: What is wrong with the layout of a message; empty where all is well.
-        seams: The latest places where samples are missing or begin; for who tells of them to
-            take away.
+        discontinuities: The latest places where samples are missing or begin, until they are
+            logged.
     """
 
     continuity: Continuity = field(default_factory=Continuity)
@@ -70,14 +70,16 @@ class SamplesHeard:
     silences: int = 0
     longest: float = 0.0
     complaint: str = ''
-    seams: deque[Seam] = field(default_factory=lambda: deque(maxlen=_UNTOLD))
+    discontinuities: deque[Discontinuity] = field(
+        default_factory=lambda: deque(maxlen=_MAX_DISCONTINUITIES)
+    )
     _layout: Layout | None = None
     _beginning: bytes = b''
     _published: int = 0
     _usual: float = 0.0
-    _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
+    _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_MAX_BLOCKS))
 
-    def hear(self, data: bytes, log_time: int, publish_time: int) -> None:
+    def receive(self, data: bytes, log_time: int, publish_time: int) -> None:
         """Follow a block of samples, serialised; times in ns since the epoch."""
         try:
             times = self._times(data)
@@ -106,7 +108,7 @@ class SamplesHeard:
             missing = max(missing_in((0.0, first), step), 0) if step > 0.0 else 0
         if joint is Joint.FIRST:
             self.first, self.head = first, missing
-        self.seams.append(Seam(joint, before, first, missing))
+        self.discontinuities.append(Discontinuity(joint, before, first, missing))
 
     def time_at(self, log_time: int) -> float:
         """Simulated time when another message was received, s: that of the block about then."""
@@ -132,7 +134,7 @@ class SamplesHeard:
         if self._published:
             passed = (publish_time - self._published) / 1e9
             self.longest = max(self.longest, passed)
-            if self._usual and passed > max(_SILENCE, _SLOWER * self._usual):
+            if self._usual and passed > max(_MIN_SILENCE, _SILENCE_RATIO * self._usual):
                 self.silences += 1
             else:
                 self._usual += 0.1 * (passed - self._usual) if self._usual else passed
@@ -140,65 +142,45 @@ class SamplesHeard:
 
 
 @dataclass
-class Start:
-    """A lathe from one start of its process to the next.
-
-    Attributes:
-        begun: When it said so, ns since the epoch; 0 where it did not.
-        changes: Of its cut, in order.
-    """
-
-    begun: int = 0
-    changes: list[Change] = field(default_factory=list)
-
-
-@dataclass
-class Journal:
+class RunLog:
     """What happened so far.
 
     Attributes:
         messages: By name of topic.
         samples: By name of topic.
         flags: Simulated time, topic and truth of each change of a monitor's flag.
-        starts: Of each logger that told of a cut: at least one.
+        cut_logs: What each logger said of a cut.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
-    samples: dict[str, SamplesHeard] = field(default_factory=dict)
+    samples: dict[str, SamplesReceived] = field(default_factory=dict)
     flags: list[tuple[float, str, bool]] = field(default_factory=list)
-    starts: dict[str, list[Start]] = field(default_factory=dict)
+    cut_logs: dict[str, CutLog] = field(default_factory=dict)
     _flag: dict[str, bool] = field(default_factory=dict)
 
-    def hear(self, topic: str, kind: str, data: bytes, log_time: int, publish_time: int) -> None:
+    def receive(
+        self, topic: str, kind: str, data: bytes, log_time: int, publish_time: int
+    ) -> None:
         """Note a message of a topic, serialised; times in ns since the epoch."""
         self.messages[topic] += 1
         if kind == SAMPLES_TYPE and topic.endswith('/samples'):
-            self.samples.setdefault(topic, SamplesHeard()).hear(data, log_time, publish_time)
+            self.samples.setdefault(topic, SamplesReceived()).receive(data, log_time, publish_time)
         elif kind == FLAG_TYPE and topic.endswith('/chatter') and len(data) > _FLAG_BYTE:
-            self._hear_flag(topic, bool(data[_FLAG_BYTE]), log_time)
+            self._receive_flag(topic, bool(data[_FLAG_BYTE]), log_time)
         elif kind == LOG_TYPE:
-            self._hear_log(data, publish_time)
+            self._receive_log(data, publish_time)
 
-    def _hear_flag(self, topic: str, up: bool, log_time: int) -> None:  # noqa: FBT001 -- it is one
+    def _receive_flag(self, topic: str, up: bool, log_time: int) -> None:  # noqa: FBT001 -- it is one
         if up != self._flag.get(topic, False):
             self._flag[topic] = up
             of_the_lathe = next(iter(self.samples.values()), None)
             time = of_the_lathe.time_at(log_time) if of_the_lathe else 0.0
             self.flags.append((time, topic, up))
 
-    def _hear_log(self, data: bytes, publish_time: int) -> None:
+    def _receive_log(self, data: bytes, publish_time: int) -> None:
         message = types().deserialize_cdr(data, LOG_TYPE)
-        change, begins = parse_change(message.msg), message.msg == BEGINNING
-        if change is None and not begins:
-            return
-        starts = self.starts.setdefault(message.name, [Start()])
-        if change is not None:
-            starts[-1].changes.append(change)
-        elif starts[-1].begun or starts[-1].changes:
-            starts.append(Start(publish_time))
-        else:
-            starts[-1].begun = publish_time
+        self.cut_logs.setdefault(message.name, CutLog()).receive(message.msg, publish_time)
 
-    def starts_of(self, lathe: str) -> list[Start]:
-        """What a lathe, by the full name of its node, told; one where it told nothing."""
-        return self.starts.get(lathe.lstrip('/').replace('/', '.'), [Start()])
+    def cut_log_of(self, lathe: str) -> CutLog:
+        """What a lathe, by the full name of its node, logged."""
+        return self.cut_logs.get(logger_of(lathe), CutLog())
