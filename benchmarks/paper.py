@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lathe_chatter.bench import Figure, this_machine
+from lathe_chatter.cli.bench import Figure, this_machine
 from lathe_chatter.knocks import (
     KnockGrid,
     Margin,

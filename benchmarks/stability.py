@@ -28,14 +28,15 @@ from pathlib import Path
 import numpy as np
 
 from lathe_chatter import stability
-from lathe_chatter.bench import Figure, this_machine
-from lathe_chatter.bench.stability import (
+from lathe_chatter.cli.bench import (
     DEPTHS,
     MACHINE,
     MANY_SPEEDS,
     SPEEDS,
+    Figure,
     growth_map,
     stability_figures,
+    this_machine,
     varied_cuts,
 )
 

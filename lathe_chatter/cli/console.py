@@ -1,45 +1,230 @@
-"""What the verbs print for machines."""
+"""Everything that the verbs print: sentences, tables, bars of progress, and JSON.
+
+Text is shown as it is. What a user wrote (a path, the title of a scenario) is nowhere taken for
+the markup of the library that draws the tables.
+"""
 
 from __future__ import annotations
 
 import json
+import math
+import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, is_dataclass
+from enum import Enum
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
 from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+from rich.text import Text
 
-from lathe_chatter.scenario import CLEARED, FLAGGED, Scenario
+from lathe_chatter.errors import LatheChatterError, reason_of
+from lathe_chatter.precompile import precompile
+
+INTERRUPTED = 130
+"""The exit code after Ctrl-C."""
+_NARROW = 60
+"""Columns of a terminal below which a bar of progress shows no times."""
 
 
-def print_json(figures: Any) -> None:
-    """Print figures as one line of JSON.
+class OutputError(LatheChatterError):
+    """A file or folder that cannot be written, or that would be lost by writing it."""
 
-    Not by way of rich, which would take `[null]` for a tag and swallow it.
+
+class Screen:
+    """Where a verb prints: sentences and tables for people, JSON for programs.
+
+    With JSON, standard output is the JSON alone, and all else goes to standard error.
+    """
+
+    def __init__(self, *, json: bool = False) -> None:
+        """Print JSON, or leave it out."""
+        self._json = json
+        self._console = Console(stderr=json, markup=False, emoji=False, highlight=False)
+
+    def say(self, text: str, style: str = '') -> None:
+        """Print text: on a terminal broken between words, elsewhere one line as it is."""
+        self._console.print(
+            Text(text, style=style), overflow='ignore', crop=False,
+            soft_wrap=not self._console.is_terminal,
+        )  # fmt: skip
+
+    def name_file(self, label: str, path: Path) -> None:
+        """Print where a file is, unbroken, so that it can be copied."""
+        self._console.print(Text(f'{label:8} {path}'), soft_wrap=True)
+
+    def table(
+        self,
+        titles: Mapping[str, str],
+        rows: Sequence[Sequence[str]],
+        heading: str = '',
+        sections: Sequence[int] = (),
+    ) -> None:
+        """Print a table, or where it is too wide for the terminal each row as some lines.
+
+        Args:
+            titles: Of the columns, each with `left`, `right`, or `text` for words that may be
+                broken between lines.
+            rows: A text for each column.
+            heading: Above the table.
+            sections: Rows before which a line is left out.
+        """
+        table = Table(box=SIMPLE_HEAD, pad_edge=False)
+        for title, kind in titles.items():
+            table.add_column(
+                Text(title), justify='right' if kind == 'right' else 'left',
+                no_wrap=kind != 'text', overflow='fold',
+            )  # fmt: skip
+        for number, row in enumerate(rows):
+            if number in sections:
+                table.add_section()
+            table.add_row(*map(Text, row))
+        if heading:
+            self.say(heading)
+        natural = self._console.measure(table).maximum if rows else 0
+        least = natural - sum(
+            _width([title, *cells], whole=True) - _width([title, *cells], whole=kind != 'text')
+            for (title, kind), cells in zip(titles.items(), zip(*rows, strict=True), strict=False)
+        )
+        if not self._console.is_terminal and not os.environ.get('COLUMNS'):
+            self._console.print(table, width=max(natural, 1), crop=False)
+        elif least <= self._console.width:
+            self._console.print(table)
+        else:
+            self._list(list(titles), rows)
+
+    def _list(self, titles: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """A table as a line for the first two cells of a row and one for each other."""
+        for row in rows:
+            self.say('  '.join(text for text in row[:2] if text))
+            for title, text in zip(titles[2:], row[2:], strict=True):
+                if text:
+                    self.say(f'    {title}: {text}')
+
+    def json(self, figures: Any) -> None:
+        """Print figures as one line of JSON, where it is wanted; see `plain`."""
+        if self._json:
+            sys.stdout.write(json.dumps(plain(figures), allow_nan=False) + '\n')
+
+    @contextmanager
+    def working(self, text: str) -> Iterator[None]:
+        """Show that something is going on; only on a terminal."""
+        if self._console.is_terminal:
+            with self._console.status(Text(text)):
+                yield
+        else:
+            yield
+
+    def compile(self) -> None:
+        """Compile the inner loops, or load what is compiled."""
+        with self.working('Compiling the integrator (once on a machine) ...'):
+            precompile()
+
+    @contextmanager
+    def progress(self, what: str, total: float | None = None, unit: str = '') -> Iterator[Bar]:
+        """Show a bar of progress while the context lasts; only on a terminal.
+
+        Args:
+            what: Is done.
+            total: When all is done; None where nobody knows yet.
+            unit: Of the total, empty for a count of things.
+        """
+        # The library ends a bar with an empty line even where it has shown none.
+        shown = self._console.is_terminal
+        columns: list[ProgressColumn] = [
+            TextColumn('{task.description}', markup=False),
+            BarColumn(bar_width=None),
+            _Done(unit),
+        ]
+        if self._console.width >= _NARROW:
+            columns += [TimeElapsedColumn(), TimeRemainingColumn()]
+        with Progress(
+            *columns, console=self._console, transient=True, disable=not shown
+        ) as progress:
+            yield Bar(progress, what, total)
+
+
+class Bar:
+    """A bar of progress."""
+
+    def __init__(self, progress: Progress, what: str, total: float | None) -> None:
+        """Begin at nothing."""
+        self._progress = progress
+        self._task = progress.add_task(what, total=total)
+
+    def advance(self, count: float = 1) -> None:
+        """So much more is done."""
+        self._progress.advance(self._task, count)
+
+    def show(
+        self, done: float | None = None, total: float | None = None, what: str | None = None
+    ) -> None:
+        """Show how much is done, of how much, and what is being done."""
+        self._progress.update(self._task, completed=done, total=total, description=what)
+
+
+def _width(cells: Iterable[str], *, whole: bool) -> int:
+    """How wide a column is: as its longest cell, or as its longest word."""
+    return max(cell_len(part) for cell in cells for part in ([cell] if whole else cell.split(' ')))
+
+
+class _Done(ProgressColumn):
+    """How much of the total is done, in its unit."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self._unit = f' {unit}' if unit else ''
+
+    def render(self, task: Task) -> Text:
+        """The share as numbers."""
+        done = f'{task.completed:.2f}' if self._unit else f'{task.completed:.0f}'
+        return Text(f'{done} of {task.total:g}{self._unit}' if task.total is not None else done)
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON holds it: a number that is not finite is null, an array a list."""
+    if isinstance(value, Enum):
+        value = value.value
+    elif isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    elif hasattr(value, '_asdict'):
+        value = value._asdict()
+    elif is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what the system refuses while a file or folder is written into a sentence.
 
     Raises:
-        ValueError: If a number is not finite: JSON has no such thing.
+        OutputError: If it cannot be written.
     """
-    sys.stdout.write(json.dumps(figures, allow_nan=False) + '\n')
-
-
-def tell_verdict(scenario: Scenario, said: Mapping[str, bool | None], console: Console) -> int:
-    """Say whether the monitor said what a scenario expects.
-
-    Args:
-        scenario: What was played.
-        said: Whether chatter was FLAGGED, and CLEARED at the end; None where nobody listened.
-        console: Where to.
-
-    Returns:
-        The exit code: 0 if it did, else 1.
-    """
-    wrong = [word for word, expected in scenario.expect.items() if said[word] != expected]
-    for word in wrong:
-        expected = 'was' if scenario.expect[word] else 'was not'
-        console.print(f'[bold red]Chatter {expected} to be {word}, and it is otherwise.[/]')
-    if scenario.expect and not wrong:
-        happened = ' and '.join(word for word in (FLAGGED, CLEARED) if scenario.expect.get(word))
-        story = f'chatter was {happened}' if happened else 'nothing was flagged'
-        console.print(f'As the scenario expects, {story}.')
-    return 1 if wrong else 0
+    try:
+        yield
+    except OSError as error:
+        # A full disk does not say which file it refuses.
+        place = error.filename or path
+        raise OutputError(f'{place} cannot be written: {reason_of(error)}.') from None

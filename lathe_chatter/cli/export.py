@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import Progress
-
-from lathe_chatter.errors import LatheChatterError, reason_of
+from lathe_chatter.cli.common_options import add_json, add_run
+from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.export import Selection, seam_sentences, to_csv, to_parquet, unroll
 
@@ -21,13 +18,9 @@ EXAMPLE = 'lathe-chatter export runs/20260401-120000 --columns tool_displacement
 _FORMATS = {'csv': to_csv, 'parquet': to_parquet, 'unrolled': unroll}
 
 
-class ExportFailedError(LatheChatterError):
-    """The file cannot be written; the text says why."""
-
-
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument('run_path', type=Path, metavar='RUN', help='folder or file of a run')
+    add_run(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument(
         '--format', choices=('csv', 'parquet'), default='csv', help='default: %(default)s'
@@ -47,7 +40,7 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument('--start', type=float, default=-math.inf, help='simulated time, s')
     parser.add_argument('--end', type=float, default=math.inf, help='simulated time, s')
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_json(parser)
 
 
 def run(options: Namespace) -> int:
@@ -61,26 +54,19 @@ def run(options: Namespace) -> int:
         columns = tuple(name.strip() for name in options.columns.split(','))
     chosen = Selection(options.topic, columns, options.start, options.end)
     recorded = read_run(source)
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    with Progress(console=console, transient=True) as progress:
-        bar = progress.add_task('samples', total=recorded.count_of_samples(options.topic))
-        try:
-            done = _FORMATS[form](
-                recorded, path, chosen, lambda count: progress.advance(bar, count)
-            )
-        except OSError as error:
-            raise ExportFailedError(f'{path} cannot be written: {reason_of(error)}.') from None
+    screen = Screen(json=options.json)
+    total = recorded.count_of_samples(options.topic)
+    with screen.progress('samples', total) as bar, writing(path):
+        done = _FORMATS[form](recorded, path, chosen, bar.advance)
     for sentence in seam_sentences(done):
-        console.print(f'note   {sentence}', markup=False)
-    out = Console(highlight=False, soft_wrap=True)
-    if options.json:
-        figures = {
-            'path': str(path),
+        screen.say(f'note   {sentence}')
+    screen.say(f'{done.samples} samples in {path}')
+    screen.json(
+        {
+            'path': path,
             'samples': done.samples,
             'gaps': done.seams.gaps,
             'restarts': done.seams.restarts,
         }
-        out.print(json.dumps(figures), markup=False)
-    else:
-        out.print(f'{done.samples} samples in {path}', markup=False)
+    )
     return 0

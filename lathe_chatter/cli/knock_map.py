@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
-from lathe_chatter.cli.console import print_json
+from lathe_chatter.cli.common_options import add_json
+from lathe_chatter.cli.console import INTERRUPTED, Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.knocks import KnockGrid, KnockMap, Margin, run_knock_map
+from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
+from lathe_chatter.knocks.knock_map import Point
 from lathe_chatter.model import Cut
 from lathe_chatter.model.quantities import quantity_of
-from lathe_chatter.precompile import precompile
 from lathe_chatter.stability import contact_at
 
 NAME = 'knock-map'
 HELP = 'simulate which knock turns a stable cut into lasting chatter, over speed and depth'
 EXAMPLE = 'lathe-chatter knock-map --speeds 2000:6000:33 --depths 0.0004:0.001:25'
 
-INTERRUPTED = 130
 _AXES = (
     ('speeds', 'spindle_speed_rpm', 'rev/min'),
     ('depths', 'depth_of_cut', 'm'),
@@ -63,7 +53,7 @@ def configure(parser: ArgumentParser) -> None:
         '--tolerance', type=float, default=0.01, metavar='X',
         help='relative width to which the smallest is bracketed (default: %(default)g)',
     )  # fmt: skip
-    parser.add_argument('--json', action='store_true', help='print the points as JSON')
+    add_json(parser)
     add_parameter_options(
         parser,
         without=(
@@ -76,7 +66,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Compute, or continue, and draw."""
-    from lathe_chatter.report.knock_picture import draw_knock_map
+    from lathe_chatter.report.knock_map import draw_knock_map
 
     speeds, depths, clearances = (
         _axis(option, field, getattr(options, option)) for option, field, _ in _AXES
@@ -85,33 +75,21 @@ def run(options: Namespace) -> int:
         config_of(options), speeds, depths, clearances,
         options.reach, options.step, options.tolerance,
     )  # fmt: skip
-    console = Console(stderr=options.json, highlight=False)
-    with console.status('Compiling the integrator (once on a machine) ...'):
-        precompile()
-    columns = (
-        TextColumn('{task.description}'),
-        BarColumn(bar_width=None),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
+    screen = Screen(json=options.json)
+    screen.compile()
     try:
-        with Progress(*columns, console=console, transient=True) as progress:
-            bar = progress.add_task('points', total=None)
-            knocks = run_knock_map(
-                grid,
-                options.output,
-                lambda done, total: progress.update(bar, completed=done, total=total),
-            )
+        with screen.progress('points') as bar:
+            knocks = run_knock_map(grid, options.output, bar.show)
     except KeyboardInterrupt:
-        console.print(f'Interrupted: the same call goes on from {options.output}.')
+        screen.say(f'Interrupted: the same call goes on from {options.output}.')
         return INTERRUPTED
     picture = options.output.with_suffix('.png')
-    draw_knock_map(knocks, picture)
-    _show(knocks, console)
-    console.print(f'points   {options.output}\npicture  {picture}', soft_wrap=True)
-    if options.json:
-        print_json(_figures(knocks))
+    with writing(picture):
+        draw_knock_map(knocks, picture)
+    _show(knocks, screen)
+    screen.name_file('points', options.output)
+    screen.name_file('picture', picture)
+    screen.json([_figures(point, limit) for point, limit in sorted(knocks.limits.items())])
     return 0
 
 
@@ -140,11 +118,11 @@ def _axis(option: str, field: str, text: str | None) -> tuple[float, ...]:
     return tuple(np.linspace(checked[0], checked[1], count).tolist())
 
 
-def _show(knocks: KnockMap, console: Console) -> None:
+def _show(knocks: KnockMap, screen: Screen) -> None:
     """How the points are divided, and the weakest of the conditionally stable ones."""
     limits = list(knocks.limits.items())
     counts = {margin: sum(limit.margin is margin for _, limit in limits) for margin in Margin}
-    console.print(
+    screen.say(
         f'{len(limits)} cuts: {counts[Margin.UNSTABLE]} chatter unknocked, '
         f'{counts[Margin.FINITE]} can be knocked into lasting chatter, '
         f'{counts[Margin.NONE_FOUND]} survived every knock tried.'
@@ -154,7 +132,7 @@ def _show(knocks: KnockMap, console: Console) -> None:
         point, limit = min(finite, key=lambda entry: abs(entry[1].impulse))
         grid = knocks.grid
         stable = contact_at(grid.config.machine, grid.cut_at(point))
-        console.print(
+        screen.say(
             f'Weakest: {point.spindle_speed_rpm:g} rev/min, {point.depth_of_cut * 1e3:.4g} mm '
             f'(limit {stable.limit * 1e3:.4g} mm), clearance '
             f'{point.bearing_clearance * 1e6:.4g} µm: a knock of '
@@ -163,15 +141,12 @@ def _show(knocks: KnockMap, console: Console) -> None:
         )
 
 
-def _figures(knocks: KnockMap) -> list[dict[str, Any]]:
-    """Every point, SI units; what is unknown is null."""
-    return [
-        point._asdict()
-        | {
-            'margin': limit.margin.value,
-            'impulse': limit.impulse if math.isfinite(limit.impulse) else None,
-            'survived': limit.survived,
-            'searched': limit.searched if math.isfinite(limit.searched) else None,
-        }
-        for point, limit in sorted(knocks.limits.items())
-    ]
+def _figures(point: Point, limit: KnockLimit) -> dict[str, Any]:
+    """A point, SI units; what is unknown is null."""
+    return {
+        **point._asdict(),
+        'margin': limit.margin.value,
+        'impulse': limit.impulse,
+        'survived': limit.survived,
+        'searched': limit.searched,
+    }

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.cli.console import print_json
+from lathe_chatter.cli.common_options import add_json
+from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
-from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact
 from lathe_chatter.model.quantities import Quantity
@@ -31,10 +31,6 @@ _HEADROOM = 2.6
 _MAP = (111, 38)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
-
-
-class OutputError(LatheChatterError):
-    """A file that cannot be written."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -56,7 +52,7 @@ def configure(parser: ArgumentParser) -> None:
         help='picture to write, with an SVG beside it (default: %(default)s)',
     )  # fmt: skip
     parser.add_argument('--csv', type=Path, metavar='FILE', help='write the limits as CSV too')
-    parser.add_argument('--json', action='store_true', help='print the limits as JSON')
+    add_json(parser)
     add_parameter_options(
         parser, without=('force_noise', 'sensor_noise', 'runout', 'seed', 'sample_rate',
                          'spindle_acceleration'),
@@ -75,23 +71,21 @@ def run(options: Namespace) -> int:
     )
     top = _top(limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
-    console = Console(stderr=options.json, highlight=False)
+    screen = Screen(json=options.json)
     varied = config.cut.speed_variation_amplitude > 0.0
     growth = None
     if options.map or varied:
-        with console.status('Computing the growth rates ...'):
+        with screen.working('Computing the growth rates ...'):
             growth = _map(config, low, high, top, varied=varied)
-    try:
+    with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
-        draw_lobes(config, limits, growth, top, options.output)
-        if options.csv is not None:
+        draw_lobes(config.cut, limits, growth, top, options.output)
+    if options.csv is not None:
+        with writing(options.csv):
             _write_csv(options.csv, config, limits)
-    except OSError as error:
-        raise OutputError(f'{error.filename} cannot be written: {error.strerror}.') from None
-    _show(config, limits, console)
-    console.print(f'picture  {options.output}', soft_wrap=True)
-    if options.json:
-        print_json(_figures(config, limits, growth))
+    _show(config, limits, screen)
+    screen.name_file('picture', options.output)
+    screen.json(_figures(config, limits, growth))
     return 0
 
 
@@ -134,22 +128,15 @@ def _write_csv(path: Path, config: LatheConfig, limits: SafeLimit) -> None:
 
 
 def _figures(config: LatheConfig, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
-    """As JSON holds it: an infinite limit is null."""
-    found: dict[str, Any] = {
-        name: [value if math.isfinite(value) else None for value in values.tolist()]
-        for name, values in _columns(config, limits).items()
+    """The chart as figures; an infinite limit is null in JSON."""
+    return {
+        'parameters': config.parameters(),
+        **_columns(config, limits),
+        **({} if growth is None else {'map': growth}),
     }
-    if growth is not None:
-        found['map'] = {
-            'spindle_speed_rpm': growth.spindle_speed_rpm.tolist(),
-            'depth_of_cut': growth.depth_of_cut.tolist(),
-            'growth_rate': growth.growth_rate.tolist(),
-            'seated': growth.seated.tolist(),
-        }
-    return {'parameters': config.parameters(), **found}
 
 
-def _show(config: LatheConfig, limits: SafeLimit, console: Console) -> None:
+def _show(config: LatheConfig, limits: SafeLimit, screen: Screen) -> None:
     """The lowest limits, and what holds at the speed of the cut."""
     names = [('open', limits.open_limit)]
     if config.cut.bearing_contact is not BearingContact.NONE:
@@ -158,4 +145,4 @@ def _show(config: LatheConfig, limits: SafeLimit, console: Console) -> None:
     for name, values in names:
         place = int(np.argmin(values))
         speed = limits.spindle_speed_rpm[place]
-        console.print(f'lowest limit, {name}: {values[place] * 1e3:.4f} mm at {speed:.0f} rev/min')
+        screen.say(f'lowest limit, {name}: {values[place] * 1e3:.4f} mm at {speed:.0f} rev/min')

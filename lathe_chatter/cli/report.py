@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-
-from lathe_chatter.cli.console import print_json
+from lathe_chatter.cli.common_options import add_json, add_run
+from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.report import draw_run
 from lathe_chatter.report.history import History, read_history
-from lathe_chatter.report.signal_views import Moment, moments_of
+from lathe_chatter.report.signal_views import Excerpt, excerpts_of
 from lathe_chatter.stability import rightmost_root
 
 NAME = 'report'
@@ -30,73 +26,68 @@ _ROUNDING = 1e-12
 
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument('run_path', type=Path, metavar='RUN', help='folder of a recorded run')
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_run(parser)
+    add_json(parser)
 
 
 def run(options: Namespace) -> int:
     """Report on a run."""
-    figures = show_run(
-        read_history(options.run_path), Console(stderr=options.json, highlight=False)
-    )
-    if options.json:
-        print_json(figures)
+    screen = Screen(json=options.json)
+    screen.json(show_run(read_history(options.run_path), screen))
     return 0
 
 
-def show_run(history: History, console: Console) -> dict[str, Any]:
+def show_run(history: History, screen: Screen) -> dict[str, Any]:
     """Print the table of a run, draw its picture beside it, and return the same as figures."""
     occurrences = _occurrences(history)
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column('time / s', justify='right')
-    table.add_column('what happened')
-    for title in ('monitor', 'root, open', 'root, seated'):
-        table.add_column(title, justify='right', no_wrap=True)
-    for entry in occurrences:
-        table.add_row(
+    titles = {'time / s': 'right', 'what happened': 'text'}
+    titles |= dict.fromkeys(('monitor', 'root, open', 'root, seated'), 'right')
+    rows = [
+        (
             f'{entry["time"]:.3f}',
             entry['what'],
             _pair(entry['frequency'], entry['growth_rate']),
             *(_pair(root['frequency'], root['growth_rate']) for root in entry['roots'].values()),
         )
-    console.print(table)
-    console.print(
+        for entry in occurrences
+    ]
+    screen.table(titles, rows)
+    screen.say(
         'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and '
         'as the rightmost characteristic root has them, of the machine open and on its bearing.'
     )
     folder = history.path if history.path.is_dir() else history.path.parent
     picture = folder / PICTURE
-    try:
+    with writing(picture):
         draw_run(history, picture)
-    except OSError as error:  # a full disk does not say which file it refuses
-        raise OSError(error.errno, error.strerror, str(picture)) from None
-    console.print(f'run      {history.path}\npicture  {picture}', soft_wrap=True)
+    screen.name_file('run', history.path)
+    screen.name_file('picture', picture)
     return {
-        'run': str(history.path),
-        'picture': str(picture),
+        'run': history.path,
+        'picture': picture,
         'occurrences': occurrences,
-        'moments': [_moment_figures(moment) for moment in moments_of(history)],
+        'moments': [_excerpt_figures(excerpt) for excerpt in excerpts_of(history)],
     }
 
 
-def _moment_figures(moment: Moment) -> dict[str, Any]:
+def _excerpt_figures(excerpt: Excerpt) -> dict[str, Any]:
     """What the portraits and spectra show, as figures."""
-    spectrum = moment.spectrum('tool_displacement')
+    spectrum = excerpt.spectrum('tool_displacement')
     moved = spectrum.amplitude.size > 0 and spectrum.amplitude.max() > _ROUNDING
     return {
-        'title': moment.title,
-        'time': moment.until,
-        'tool_peak_to_peak': _known(moment.size('tool_displacement')),
-        'workpiece_peak_to_peak': _known(moment.size('workpiece_displacement')),
+        'title': excerpt.title,
+        'time': excerpt.until,
+        'tool_peak_to_peak': excerpt.size('tool_displacement'),
+        'workpiece_peak_to_peak': excerpt.size('workpiece_displacement'),
         'frequency': spectrum.peak if moved else None,
-        'out_of_cut': _known(moment.out_of_cut),
-        'on_bearing': _known(moment.on_bearing),
+        'out_of_cut': excerpt.out_of_cut,
+        'on_bearing': excerpt.on_bearing,
     }
 
 
 def _pair(frequency: float | None, growth_rate: float | None) -> str:
     """Frequency and growth rate, blank where unknown."""
-    if frequency is None or growth_rate is None:
+    if frequency is None or growth_rate is None or math.isnan(frequency + growth_rate):
         return ''
     return f'{frequency:.1f}  {growth_rate:+7.2f}'
 
@@ -115,8 +106,7 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
     for flag in history.flags:
         entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
         if flag.chatter:
-            entry['frequency'] = _known(flag.frequency)
-            entry['growth_rate'] = _known(flag.growth_rate)
+            entry |= {'frequency': flag.frequency, 'growth_rate': flag.growth_rate}
         result.append(entry)
     result.sort(key=lambda entry: float(entry['time']))
     result.append(_entry(history, history.duration, 'end'))
@@ -149,8 +139,3 @@ def _cut_text(cut: Cut) -> str:
     if cut.bearing_contact is BearingContact.NONE:
         words[-1] = 'no clearance'
     return ', '.join(words)
-
-
-def _known(value: float) -> float | None:
-    """None for nan, as JSON has no nan."""
-    return value if math.isfinite(value) else None

@@ -12,18 +12,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
-
-from lathe_chatter.cli.console import print_json
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.cli.common_options import add_json
+from lathe_chatter.cli.console import Screen, plain, writing
 from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
 from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
 from lathe_chatter.paper.overview import draw_conditions, draw_findings, draw_growth
 from lathe_chatter.paper.page import OVERVIEWS, write_page
-from lathe_chatter.precompile import precompile
 
 NAME = 'reproduce'
 HELP = "reproduce the paper's 14 runs: verdicts, exact roots, measured growth rates, figures"
@@ -31,10 +25,6 @@ EXAMPLE = 'lathe-chatter reproduce --output reproduction'
 
 FIGURES = 'reproduction.json'
 _FINDING_STEPS = 3
-
-
-class OutputError(LatheChatterError):
-    """A folder that cannot be written."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -48,52 +38,42 @@ def configure(parser: ArgumentParser) -> None:
         action='store_true',
         help='leave out the pictures: tables and figures only',
     )
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_json(parser)
 
 
 def run(options: Namespace) -> int:
     """Reproduce; 0 if every verdict of the paper agrees, else 1."""
     folder: Path = options.output
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f'The folder {folder} cannot be made: {error.strerror}.') from None
-    console = Console(stderr=options.json, highlight=False)
-    with console.status('Compiling the integrator (once on a machine) ...'):
-        precompile()
+    screen = Screen(json=options.json)
+    screen.compile()
     pictures = [] if options.no_pictures else [*OVERVIEWS, *paper_pictures()]
-    results, findings = _work(folder, pictures, console)
-    page = write_page(folder, results, findings, pictures)
-    figures = figures_of(results, findings)
-    text = json.dumps(figures, indent=2)
-    (folder / FIGURES).write_text(text + '\n', encoding='utf-8')
-    _show(results, findings, console)
-    console.print(f'page     {page}\nfigures  {folder / FIGURES}', soft_wrap=True)
-    if options.json:
-        print_json(figures)
+    with writing(folder):
+        results, findings = _work(folder, pictures, screen)
+        page = write_page(folder, results, findings, pictures)
+        figures = figures_of(results, findings)
+        text = json.dumps(plain(figures), indent=2, allow_nan=False)
+        (folder / FIGURES).write_text(text + '\n', encoding='utf-8')
+    _show(results, findings, screen)
+    screen.name_file('page', page)
+    screen.name_file('figures', folder / FIGURES)
+    screen.json(figures)
     return 0 if all(result.agrees for result in results) else 1
 
 
 def _work(
-    folder: Path, pictures: Sequence[Picture], console: Console
+    folder: Path, pictures: Sequence[Picture], screen: Screen
 ) -> tuple[list[Reproduced], Findings]:
     """Compute here while other processes draw."""
-    columns = (
-        TextColumn('{task.description}'),
-        BarColumn(bar_width=None),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
     # Not forked: threads of a library that has begun to compute do not survive that.
     pool = ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context('spawn'))
-    with pool, Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task(
-            'runs and pictures', total=len(PAPER_RUNS) + _FINDING_STEPS + len(pictures)
-        )
+    total = len(PAPER_RUNS) + _FINDING_STEPS + len(pictures)
+    with pool, screen.progress('runs and pictures', total) as bar:
         drawn: list[Future[None]] = []
 
         def step(_: Any = None) -> None:
-            progress.advance(bar)
+            bar.advance()
 
         def draw(work: Callable[..., None], *arguments: Any) -> None:
             future = pool.submit(work, *arguments)
@@ -128,7 +108,7 @@ def figures_of(results: list[Reproduced], findings: Findings) -> dict[str, Any]:
                 'spindle_speed_rpm': result.run.spindle_speed_rpm,
                 'depth_of_cut': result.run.depth_of_cut,
                 'bearing_clearance': result.run.bearing_clearance,
-                'places': list(result.run.places),
+                'places': result.run.places,
                 'words': result.run.words,
                 'paper_unstable': result.run.unstable,
                 'unstable': result.unstable,
@@ -151,45 +131,43 @@ def figures_of(results: list[Reproduced], findings: Findings) -> dict[str, Any]:
         | {'readings': [asdict(reading) for reading in findings.readings]},
         'screening_function': [
             {
-                'contact': reading.contact.value,
+                'contact': reading.contact,
                 'verdicts': reading.verdicts,
-                'against': list(reading.against),
+                'against': reading.against,
             }
             for reading in findings.screening
         ],
         'clearance': asdict(findings.clearance),
         'bearing_stiffness': {
-            'share_of_workpiece': stiffness.shares.tolist(),
-            'critical_depth': stiffness.limits.tolist(),
+            'share_of_workpiece': stiffness.shares,
+            'critical_depth': stiffness.limits,
             'worst_share': stiffness.worst,
         },
         'figure_windows': [asdict(window) for window in findings.windows],
     }
 
 
-def _show(results: list[Reproduced], findings: Findings, console: Console) -> None:
+def _show(results: list[Reproduced], findings: Findings, screen: Screen) -> None:
     """Print what was found."""
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column('run', no_wrap=True)
-    table.add_column('the paper')
-    for title in ('root', 'measured', 'agrees', 'eq. (9)'):
-        table.add_column(title, justify='right', no_wrap=True)
-    for result in results:
-        literal = result.literal
-        table.add_row(
+    titles = {'run': 'left', 'the paper': 'left'}
+    titles |= dict.fromkeys(('root', 'measured', 'agrees', 'eq. (9)'), 'right')
+    rows = [
+        (
             result.run.title,
             result.run.pace.value,
             f'{result.root.real:+.4f}',
             f'{result.measured.real:+.4f}',
-            'yes' if result.agrees else '[bold]no[/bold]',
-            '' if literal is None else 'agrees' if result.literal_agrees else 'stable',
+            'yes' if result.agrees else 'no',
+            _literal_word(result),
         )
-    console.print(table)
+        for result in results
+    ]
+    screen.table(titles, rows)
     found = findings.coefficient
     verdicts = {reading.contact.value: reading.verdicts for reading in findings.screening}
     count = len(results)
     agreeing = sum(result.agrees for result in results)
-    console.print(
+    screen.say(
         f'{agreeing} of {count} verdicts agree. Growth rates in 1/s: of the rightmost root, and\n'
         'measured from the time simulation; eq. (9): the same with the screening function as '
         'printed.\n'
@@ -197,3 +175,10 @@ def _show(results: list[Reproduced], findings: Findings, console: Console) -> No
         f'Screening function never 1: {verdicts["none"]} of {count} verdicts hold; as printed: '
         f'{verdicts["gap"]}; always 1: {verdicts["seated"]}.'
     )
+
+
+def _literal_word(result: Reproduced) -> str:
+    """What equation (9) as printed comes to, empty for a run without clearance."""
+    if result.literal is None:
+        return ''
+    return 'agrees' if result.literal_agrees else 'stable'

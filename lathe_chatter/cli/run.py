@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from datetime import datetime
 from pathlib import Path
 
-from rich.console import Console
-
-from lathe_chatter.cli.console import tell_verdict
+from lathe_chatter.cli.common_options import add_json, scenario_help, verdict
+from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.process_group import RunFailedError
-from lathe_chatter.precompile import precompile
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.run import RunReadError
 from lathe_chatter.report.history import read_history
@@ -23,14 +20,11 @@ from lathe_chatter.scenario import (
     Scenario,
     find_scenario,
     load_scenario,
-    shipped_scenarios,
 )
 
 NAME = 'run'
 HELP = 'start lathe, monitor and recorder, play a scenario, and leave the recorded run'
 EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
-
-INTERRUPTED = 130
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -39,12 +33,12 @@ def configure(parser: ArgumentParser) -> None:
         '--scenario',
         default='clearance',
         metavar='FILE',
-        help=f'a YAML file, or one of {", ".join(shipped_scenarios())} (default: %(default)s)',
+        help=f'{scenario_help()} (default: %(default)s)',
     )
     parser.add_argument(
         '--output', type=Path, metavar='DIR', help='folder to make (default: runs/<date-time>)'
     )
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_json(parser)
 
 
 def run(options: Namespace) -> int:
@@ -54,28 +48,25 @@ def run(options: Namespace) -> int:
     output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
     if output.exists():
         raise RunFailedError(f'{output} exists already: give another --output.')
-    console = Console(stderr=options.json, highlight=False)
-    console.print(f'[bold]{scenario.title}[/bold]  (scenario {scenario.name})')
-    with console.status('Compiling the integrator (once on a machine) ...'):
-        precompile()
-    interrupted = _play(scenario, file, output, console)
+    screen = Screen(json=options.json)
+    screen.say(f'{scenario.title}  (scenario {scenario.name})', 'bold')
+    screen.compile()
+    interrupted = _play(scenario, file, output, screen)
     if interrupted and not _has_samples(output):
-        console.print('Interrupted before anything was recorded.')
+        screen.say('Interrupted before anything was recorded.')
         return INTERRUPTED
     if interrupted:
-        console.print('Interrupted: the run is finished and reported ...')
+        screen.say('Interrupted: the run is finished and reported ...')
     history = read_history(output)
-    figures = show_run(history, console)
-    if options.json:
-        Console(highlight=False, soft_wrap=True).print(json.dumps(figures))
+    screen.json(show_run(history, screen))
     if interrupted:
-        console.print('Interrupted: the run above is complete up to that moment.')
+        screen.say('Interrupted: the run above is complete up to that moment.')
         return INTERRUPTED
     said = {
         FLAGGED: any(flag.chatter for flag in history.flags),
         CLEARED: bool(history.flags) and not history.flags[-1].chatter,
     }
-    return tell_verdict(scenario, said, console)
+    return verdict(scenario, said, screen)
 
 
 def _has_samples(output: Path) -> bool:
@@ -88,7 +79,7 @@ def _has_samples(output: Path) -> bool:
         return False
 
 
-def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool:
+def _play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
     """Play a scenario with a cell of nodes; whether it was interrupted.
 
     Raises:
@@ -102,4 +93,4 @@ def _play(scenario: Scenario, file: Path, output: Path, console: Console) -> boo
             f'ROS 2 is not there ({error}): source an installation, or use `make run`, '
             'which installs what it needs.'
         ) from None
-    return play(scenario, file, output, console)
+    return play(scenario, file, output, screen)

@@ -7,17 +7,13 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-from lathe_chatter.cli.console import print_json, tell_verdict
+from lathe_chatter.cli.common_options import add_json, scenario_help, verdict
+from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
-from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.cut_events import Knock
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.precompile import precompile
 from lathe_chatter.report.history import read_history
 from lathe_chatter.scenario import (
     CLEARED,
@@ -25,7 +21,6 @@ from lathe_chatter.scenario import (
     Scenario,
     find_scenario,
     load_scenario,
-    shipped_scenarios,
 )
 from lathe_chatter.scenario.simulation import Simulated, needs_monitor, simulate
 
@@ -35,10 +30,6 @@ EXAMPLE = 'lathe-chatter simulate --depth-of-cut 0.001 --duration 20 --output ru
 
 _DURATION = Quantity('simulated time', 's', high=86400.0, exclusive=True)
 _USUAL_DURATION = 10.0
-
-
-class SimulationFailedError(LatheChatterError):
-    """A run that cannot be written."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -52,7 +43,7 @@ def configure(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         '--scenario', metavar='FILE',
-        help=f'a YAML file, or one of {", ".join(shipped_scenarios())}; options below win',
+        help=f'{scenario_help()}; options below win',
     )  # fmt: skip
     parser.add_argument(
         '--knock', action='append', default=[], metavar='T:J',
@@ -63,7 +54,7 @@ def configure(parser: ArgumentParser) -> None:
         help='have the monitor watch even if no scenario waits for it',
     )  # fmt: skip
     parser.add_argument('--report', action='store_true', help='report on the run when it is done')
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_json(parser)
     add_parameter_options(parser)
 
 
@@ -71,20 +62,19 @@ def run(options: Namespace) -> int:
     """Simulate; 0 if the lathe got to the end and the monitor said what is expected, else 1."""
     scenario = _scenario(options)
     knocks = [_knock(text, scenario.duration) for text in options.knock]
-    console = Console(stderr=options.json, highlight=False)
-    with console.status('Compiling the integrator (once on a machine) ...'):
-        precompile()
+    screen = Screen(json=options.json)
+    screen.compile()
     begun = time.perf_counter()
-    done = _simulated(options, scenario, knocks, console)
+    done = _simulated(options, scenario, knocks, screen)
     spent = time.perf_counter() - begun
-    console.print(
+    screen.say(
         f'{done.time:g} s simulated in {spent:.2f} s, {done.time / spent:.0f} times real time: '
         f'{done.samples} samples.'
     )
     if done.guard:
-        console.print(done.guard)
+        screen.say(done.guard)
     figures = {
-        'run': str(done.folder),
+        'run': done.folder,
         'samples': done.samples,
         'simulated_time': done.time,
         'wall_time': spent,
@@ -93,13 +83,12 @@ def run(options: Namespace) -> int:
         'guard': done.guard,
     }
     if options.report:
-        figures |= show_run(read_history(done.folder), console)
+        figures |= show_run(read_history(done.folder), screen)
     else:
-        console.print(f'run      {escape(str(done.folder))}', soft_wrap=True)
-    if options.json:
-        print_json(figures)
+        screen.name_file('run', done.folder)
+    screen.json(figures)
     said = {FLAGGED: done.flagged, CLEARED: done.cleared}
-    wrong = tell_verdict(scenario, said, console)
+    wrong = verdict(scenario, said, screen)
     return 1 if done.guard else wrong
 
 
@@ -131,26 +120,18 @@ def _knock(text: str, duration: float) -> Knock:
 
 
 def _simulated(
-    options: Namespace, scenario: Scenario, knocks: list[Knock], console: Console
+    options: Namespace, scenario: Scenario, knocks: list[Knock], screen: Screen
 ) -> Simulated:
     """Simulate with a bar of simulated time."""
-    columns = (
-        TextColumn('{task.completed:6.2f} of {task.total:g} s'),
-        BarColumn(bar_width=None),
-        TimeElapsedColumn(),
-    )
-    try:
-        with Progress(*columns, console=console, transient=True) as progress:
-            bar = progress.add_task('', total=scenario.duration)
-            return simulate(
-                scenario,
-                options.output,
-                knocks=knocks,
-                monitor=options.monitor or needs_monitor(scenario),
-                progress=lambda now: progress.update(bar, completed=now),
-                tell=lambda now, what: console.print(f'{now:7.2f} s  {escape(what)}'),
-            )
-    except OSError as error:
-        raise SimulationFailedError(
-            f'The run {options.output} cannot be written: {error.strerror}.'
-        ) from None
+    with (
+        screen.progress('simulating', scenario.duration, 's') as bar,
+        writing(options.output),
+    ):
+        return simulate(
+            scenario,
+            options.output,
+            knocks=knocks,
+            monitor=options.monitor or needs_monitor(scenario),
+            progress=bar.show,
+            tell=lambda now, what: screen.say(f'{now:7.2f} s  {what}'),
+        )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import Progress
-
+from lathe_chatter.cli.common_options import add_json, add_run
+from lathe_chatter.cli.console import Screen
 from lathe_chatter.recording import RunReadError, Verification, read_run, resimulate, verify
 from lathe_chatter.recording.resimulate import finding_of
 
@@ -19,48 +17,45 @@ EXAMPLE = 'lathe-chatter verify runs/20260401-120000 --resimulate'
 
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument('run_path', type=Path, metavar='RUN', help='folder or file of a run')
+    add_run(parser)
     parser.add_argument(
         '--resimulate',
         action='store_true',
         help='also compute every sample again and compare it bit for bit',
     )
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    add_json(parser)
 
 
 def run(options: Namespace) -> int:
     """Verify; 0 if nothing is missing, else 1."""
-    found = _verified(options.run_path, again=options.resimulate)
-    console = Console(highlight=False, soft_wrap=True)
-    if options.json:
-        figures = {
-            'complete': found.complete,
-            'messages': dict(found.messages),
-            'samples': {name: count._asdict() for name, count in found.samples.items()},
-            'findings': [finding._asdict() for finding in found.findings],
-        }
-        console.print(json.dumps(figures), markup=False)
-        return 0 if found.complete else 1
+    screen = Screen(json=options.json)
+    found = _verified(options.run_path, screen, again=options.resimulate)
     for name, count in sorted(found.messages.items()):
-        console.print(f'{count:9d}  {name}', markup=False)
+        screen.say(f'{count:9d}  {name}')
     for name, samples in sorted(found.samples.items()):
-        text = f'{name}: {samples.samples} samples, {samples.first:g} s to {samples.last:g} s'
-        console.print(text, markup=False)
+        screen.say(f'{name}: {samples.samples} samples, {samples.first:g} s to {samples.last:g} s')
     for finding in found.findings:
-        console.print(('WRONG  ' if finding.loss else 'note   ') + finding.text, markup=False)
-    console.print('complete' if found.complete else 'NOT complete')
+        screen.say(('WRONG  ' if finding.loss else 'note   ') + finding.text)
+    screen.say('complete' if found.complete else 'NOT complete')
+    screen.json(
+        {
+            'complete': found.complete,
+            'messages': found.messages,
+            'samples': found.samples,
+            'findings': found.findings,
+        }
+    )
     return 0 if found.complete else 1
 
 
-def _verified(path: Path, *, again: bool) -> Verification:
+def _verified(path: Path, screen: Screen, *, again: bool) -> Verification:
     """What is found in a run, and what comes of computing it again if that is wanted."""
     # Nearly all of what a lathe's run has are its samples, which are looked at twice.
     total = 2 * read_run(path, damaged=True).count_of_messages()
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task('messages', total=total or None)
-        found = verify(path, lambda count: progress.advance(bar, count))
+    with screen.progress('messages', total or None) as bar:
+        found = verify(path, bar.advance)
         if again:
-            progress.update(bar, description='computing again', total=None)
+            bar.show(what='computing again')
             try:
                 found.findings += [finding_of(each) for each in resimulate(found.run)]
             except RunReadError:

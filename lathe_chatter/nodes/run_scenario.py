@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any, Protocol
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
@@ -32,14 +32,27 @@ _GRACE = 10.0
 """s of simulated time beyond a scenario's end for what the monitor is expected to say."""
 
 
-def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool:
+class Screen(Protocol):
+    """Where it is told what happens; `lathe_chatter.cli.console` has one."""
+
+    def say(self, text: str) -> None:
+        """Print a sentence."""
+
+    def working(self, text: str) -> AbstractContextManager[None]:
+        """Show that something is going on."""
+
+    def progress(self, what: str, total: float, unit: str) -> AbstractContextManager[Any]:
+        """Show a bar of progress, which has `show(done, what=...)`."""
+
+
+def play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
     """Start the cell, play, and end the cell.
 
     Args:
         scenario: What to play.
         file: Of the scenario, to be kept in the run.
         output: Folder of the run, to make.
-        console: Where to tell what happens.
+        screen: Where to tell what happens.
 
     Returns:
         Whether it was interrupted.
@@ -55,7 +68,7 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
     try:
         with DeferredSignals() as held:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-            operator = Operator(scenario, tell=console.print)
+            operator = Operator(scenario, tell=screen.say)
             executor = SingleThreadedExecutor()
             executor.add_node(operator)
 
@@ -64,7 +77,7 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
                 held.deliver()
 
             try:
-                return _play(operator, spin, file, output, console)
+                return _play(operator, spin, file, output, screen)
             finally:
                 _let_graph_settle(executor)
                 executor.shutdown()
@@ -75,7 +88,7 @@ def play(scenario: Scenario, file: Path, output: Path, console: Console) -> bool
 
 
 def _play(
-    operator: Operator, spin_once: Callable[[], None], file: Path, output: Path, console: Console
+    operator: Operator, spin_once: Callable[[], None], file: Path, output: Path, screen: Screen
 ) -> bool:
     """Play with an operator who is there; whether it was interrupted."""
     interrupted = False
@@ -86,7 +99,7 @@ def _play(
             cell.check()
 
         try:
-            with console.status('Starting the monitor and the recorder ...'):
+            with screen.working('Starting the monitor and the recorder ...'):
                 _look_around(operator, spin)
                 cell.start(
                     'run_recorder',
@@ -103,7 +116,7 @@ def _play(
                 parameter_arguments({'await_readers': _READERS, **operator.scenario.parameters}),
             )
             operator.playing = True
-            _follow(operator, spin, console)
+            _follow(operator, spin, screen)
         except KeyboardInterrupt:
             interrupted = True
         complaints = cell.end()
@@ -159,18 +172,11 @@ def _await_nodes(operator: Operator, spin: Callable[[], None]) -> None:
     _refuse_company(operator, {**_OURS, 'lathe': 0})
 
 
-def _follow(operator: Operator, spin: Callable[[], None], console: Console) -> None:
+def _follow(operator: Operator, spin: Callable[[], None], screen: Screen) -> None:
     """Spin until the scenario is played, with a bar of simulated time."""
     scenario = operator.scenario
-    columns = (
-        TextColumn('{task.completed:6.2f} of {task.total:.0f} s'),
-        BarColumn(bar_width=None),
-        TextColumn('{task.description}'),
-        TimeElapsedColumn(),
-    )
     until = time.monotonic() + _START_PATIENCE
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = progress.add_task('waiting for the lathe', total=scenario.duration)
+    with screen.progress('waiting for the lathe', scenario.duration, 's') as bar:
         while not _finished(operator, scenario):
             spin()
             _refuse_company(operator)
@@ -180,10 +186,9 @@ def _follow(operator: Operator, spin: Callable[[], None], console: Console) -> N
                 raise RunFailedError(
                     f'The lathe published no sample within {_START_PATIENCE:.0f} s.'
                 )
-            progress.update(
-                bar,
-                completed=min(operator.time, scenario.duration),
-                description=operator.state if operator.time else 'waiting for the lathe',
+            bar.show(
+                min(operator.time, scenario.duration),
+                what=operator.state if operator.time else 'waiting for the lathe',
             )
 
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from lathe_chatter.report.run_picture import draw_run
+from lathe_chatter.report.run_report import draw_run
 
 __all__ = ['draw_run']

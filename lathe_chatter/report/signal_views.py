@@ -1,4 +1,4 @@
-"""What a cut is like at a moment of a run: its size, its spectrum, and once in every turn."""
+"""Excerpts of a run in which the cut is one: its size, its spectrum, and once in every turn."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.report.history import History
 
 _LONGEST = 2.0
-"""s before a moment that its spectrum and its section are taken from, at most."""
+"""s that an excerpt has at most."""
 _PORTRAIT = 0.25
 """s that a phase portrait shows."""
 _FEWEST = 16
@@ -51,11 +51,11 @@ class Section(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Moment:
+class Excerpt:
     """The last part of a run before an instant, within which the cut did not change.
 
     Attributes:
-        title: Which moment of the run.
+        title: Which excerpt of the run.
         until: Simulated time, s.
         cut: In force.
         samples: By name of column, the last `_LONGEST` s at most.
@@ -104,35 +104,35 @@ class Moment:
         )
 
 
-def moments_of(history: History) -> list[Moment]:
-    """Two or three moments worth a closer look: before anything happened, chatter, the end."""
+def excerpts_of(history: History) -> list[Excerpt]:
+    """Two or three that are worth a closer look: before anything happened, chatter, the end."""
     end = history.duration
-    happenings = _happenings(history)
-    first = happenings[0] if happenings else min(_PORTRAIT, end)
-    wanted = [('before the first change' if happenings else 'at the start', first)]
+    disturbances = _disturbances(history)
+    first = disturbances[0] if disturbances else min(_PORTRAIT, end)
+    wanted = [('before the first change' if disturbances else 'at the start', first)]
     spans = history.chatter_spans()
     if spans:
         start, stop = spans[0]
-        inside = [time for time in happenings if start < time < stop]
+        inside = [time for time in disturbances if start < time < stop]
         wanted.append(('chatter', inside[0] if inside else stop))
     if end > wanted[-1][1]:
         wanted.append(('at the end', end))
-    return [_moment(history, title, until) for title, until in wanted]
+    return [_excerpt(history, title, until) for title, until in wanted]
 
 
-def _happenings(history: History) -> list[float]:
+def _disturbances(history: History) -> list[float]:
     """When the cut was changed or knocked, s."""
     times = [change.time for change in history.changes] + [k.time for k in history.knocks]
     return sorted(time for time in times if 0.0 < time <= history.duration)
 
 
-def _moment(history: History, title: str, until: float) -> Moment:
+def _excerpt(history: History, title: str, until: float) -> Excerpt:
     """The samples before an instant, back to what happened before it."""
-    since = max((time for time in _happenings(history) if time < until - 1e-9), default=0.0)
+    since = max((time for time in _disturbances(history) if time < until - 1e-9), default=0.0)
     since = max(since, until - _LONGEST)
     time = history.samples['time']
     inside = (time > since) & (time <= until)
-    return Moment(
+    return Excerpt(
         title,
         until,
         history.cut_at(0.5 * (since + until)),

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.lathe.config import LatheConfig
-from lathe_chatter.model import BearingContact
+from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.report.style import LINE, OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.stability import GrowthMap, SafeLimit
 
@@ -29,24 +28,26 @@ def chart_speeds(low_rpm: float, high_rpm: float) -> Array:
 
 
 def draw_lobes(
-    config: LatheConfig,
-    limits: SafeLimit,
-    growth: GrowthMap | None,
-    depth_limit: float,
-    path: Path,
+    cut: Cut, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
 ) -> None:
-    """Draw a chart with its point of operation, as PNG and SVG.
+    """Draw a chart into a PNG file with an SVG beside it; see `draw_chart`."""
+    figure = new_figure(11.0, 6.0)
+    draw_chart(figure.subplots(), cut, limits, growth, depth_limit)
+    save(figure, path)
+
+
+def draw_chart(
+    axes: Axes, cut: Cut, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float
+) -> None:
+    """Draw a chart with its point of operation.
 
     Args:
-        config: The machine and its cut.
+        axes: To draw into.
+        cut: The point of operation; its bearing is that of the limits.
         limits: Over rising speeds.
         growth: To colour the chart with, or None.
         depth_limit: Top of the chart, m.
-        path: Of the PNG file.
     """
-    figure = new_figure(11.0, 6.0)
-    axes = figure.subplots()
-    cut = config.cut
     varied = cut.speed_variation_amplitude > 0.0
     if growth is not None:
         _draw_growth(axes, growth, zero=varied)
@@ -70,7 +71,6 @@ def draw_lobes(
             f'{cut.speed_variation_frequency:g} Hz'
         )
     axes.set_title(text, fontsize=11)
-    save(figure, path)
 
 
 def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:

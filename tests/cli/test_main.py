@@ -45,15 +45,24 @@ def test_a_mistake_is_one_sentence_and_exit_2(
     assert '\n' not in written
 
 
-def test_an_unknown_option_is_refused_with_those_that_the_verb_has(
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        (
+            ['lobes', '--depth-limits', '1'],
+            'lathe-chatter lobes: unrecognized arguments: --depth-limits 1, perhaps --depth-limit',
+        ),
+        (['lobes', '--from'], 'lathe-chatter lobes: argument --from: expected one argument'),
+        (['simulate'], 'lathe-chatter simulate: the following arguments are required: --output'),
+    ],
+)
+def test_a_wrong_command_line_is_a_line_and_where_to_look(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(['lobes', '--speeds', '1:2'])
+        main(arguments)
     assert ended.value.code == 2
-    written = capsys.readouterr().err
-    assert '--from RPM' in written
-    assert written.endswith('lathe-chatter lobes: error: unrecognized arguments: --speeds 1:2\n')
+    assert capsys.readouterr().err == f'{said}\nSee lathe-chatter {arguments[0]} --help.\n'
 
 
 def test_the_program_starts_without_ros_and_says_its_version(tmp_path: Path) -> None:

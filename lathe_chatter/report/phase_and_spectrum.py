@@ -1,4 +1,4 @@
-"""What a cut is like at a moment: its phase portrait, its spectrum, once in every turn."""
+"""An excerpt of a run as phase portraits, as spectra, and once in every turn."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.report.history import History
-from lathe_chatter.report.signal_views import Moment
+from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.report.style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for
 from lathe_chatter.stability import contact_at, rightmost_root
 
@@ -29,10 +29,10 @@ _TOP_AT_REST = 1e-6
 """m: top of the empty spectrum of a cut at rest."""
 
 
-def draw_portrait(axes: Axes, history: History, moment: Moment) -> None:
+def draw_portrait(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Phase portraits of tool and workpiece."""
     del history
-    columns = moment.portrait
+    columns = excerpt.portrait
     _draw_plane(
         axes,
         {
@@ -41,29 +41,29 @@ def draw_portrait(axes: Axes, history: History, moment: Moment) -> None:
         },
         lines=True,
     )
-    cut = moment.cut
+    cut = excerpt.cut
     axes.set_title(
-        f'{moment.title} (to {moment.until:.2f} s)\n{cut.spindle_speed_rpm:g} rev/min, '
+        f'{excerpt.title} (to {excerpt.until:.2f} s)\n{cut.spindle_speed_rpm:g} rev/min, '
         f'{cut.depth_of_cut * 1e3:g} mm',
         fontsize=10,
     )
     axes.legend(loc='upper right', frameon=False, fontsize=8)
 
 
-def draw_section(axes: Axes, history: History, moment: Moment) -> None:
+def draw_section(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Displacement and velocity once per turn: a point for what repeats with the spindle."""
     del history
-    sections = {name: moment.section(name) for name, _, _ in _BODIES}
+    sections = {name: excerpt.section(name) for name, _, _ in _BODIES}
     _draw_plane(axes, {name: tuple(section) for name, section in sections.items()}, lines=False)
     turns = len(sections['tool'].displacement)
     axes.set_title(f'once per turn, {turns} turns', fontsize=10)
 
 
-def draw_spectrum(axes: Axes, history: History, moment: Moment) -> None:
+def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Amplitude spectra of both displacements, with the frequency that the root predicts."""
     scale, top = Scale(1e6, 'µm'), 0.0
     for name, colour, _ in _BODIES:
-        spectrum = moment.spectrum(f'{name}_displacement')
+        spectrum = excerpt.spectrum(f'{name}_displacement')
         shown = (spectrum.frequency <= _HIGHEST) & (spectrum.amplitude > 0.0)
         if not shown.any() or spectrum.amplitude[shown].max() < _FAINTEST:
             continue
@@ -75,16 +75,16 @@ def draw_spectrum(axes: Axes, history: History, moment: Moment) -> None:
     if not top:
         _say_at_rest(axes, 'no amplitude above 1 nm')
         top = _TOP_AT_REST
-    contact = contact_at(history.machine, moment.cut, tool_leaves_cut=history.tool_leaves_cut)
+    contact = contact_at(history.machine, excerpt.cut, tool_leaves_cut=history.tool_leaves_cut)
     root = rightmost_root(
         history.machine,
-        moment.cut.spindle_speed_rpm,
-        moment.cut.depth_of_cut,
+        excerpt.cut.spindle_speed_rpm,
+        excerpt.cut.depth_of_cut,
         seated=contact.seated,
     )
     expected = root.imag / (2.0 * math.pi)
     axes.axvline(expected, color='k', lw=0.9, ls='--', label=f'root, {expected:.1f} Hz')
-    axes.axvline(moment.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')
+    axes.axvline(excerpt.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')
     axes.set_yscale('log')
     axes.set_xlim(0.0, _HIGHEST)
     axes.set_ylim(top * scale.factor * 10.0**-_DECADES, 3.0 * top * scale.factor)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lathe_chatter.report.run_picture import apart
+from lathe_chatter.report.time_histories import apart
 
 
 def test_figures_are_not_joined_over_a_silence() -> None:

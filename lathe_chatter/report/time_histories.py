@@ -1,8 +1,8 @@
-"""The picture of a run: over time, at its moments, and on the stability chart."""
+"""A run over time: displacements, force and growth rates, with what happened when."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +11,6 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
 from lathe_chatter.model import BearingContact
 from lathe_chatter.report.history import History
-from lathe_chatter.report.moment_panels import draw_portrait, draw_section, draw_spectrum
-from lathe_chatter.report.operating_path import bearings_of, draw_path
-from lathe_chatter.report.signal_views import moments_of
 from lathe_chatter.report.style import (
     ALARM,
     ALARM_TEXT,
@@ -23,8 +20,6 @@ from lathe_chatter.report.style import (
     WORKPIECE,
     envelope,
     grid,
-    new_figure,
-    save,
     scale_for,
 )
 from lathe_chatter.stability import contact_at, rightmost_root
@@ -39,36 +34,23 @@ _SILENCE = 0.2
 _BODIES = (('tool', TOOL), ('workpiece', WORKPIECE))
 
 
-def draw_run(history: History, path: Path) -> None:
-    """Draw a run: time histories, phase portraits, spectra, sections and the chart.
+def draw_time_histories(panels: Sequence[Axes], history: History) -> None:
+    """Draw tool, workpiece, cutting force and growth rate over time.
 
     Args:
+        panels: Four, from top to bottom, with one axis of time.
         history: The run.
-        path: Of the PNG file to write; an SVG is put beside it.
     """
-    figure = new_figure(12.0, 21.0)
-    rows = figure.add_gridspec(8, 1, height_ratios=[1.0, 1.0, 0.7, 0.8, 1.5, 1.1, 1.3, 1.7])
-    tool = figure.add_subplot(rows[0])
-    workpiece, force, growth = (figure.add_subplot(rows[k], sharex=tool) for k in (1, 2, 3))
+    tool, workpiece, force, growth = panels
     _draw_displacements(tool, workpiece, history)
     _draw_force(force, history)
     _draw_rates(growth, history)
-    for axes in (tool, workpiece, force, growth):
+    for axes in panels:
         _mark(axes, history)
         grid(axes)
         axes.margins(x=0.0)
         axes.tick_params(labelbottom=axes is growth)
     _label_changes(tool, history)
-    moments = moments_of(history)
-    for row, draw in ((4, draw_portrait), (5, draw_spectrum), (6, draw_section)):
-        cells = rows[row].subgridspec(1, len(moments))
-        for place, moment in enumerate(moments):
-            draw(figure.add_subplot(cells[place]), history, moment)
-    bearings = bearings_of(history)
-    cells = rows[7].subgridspec(1, len(bearings))
-    for place, bearing in enumerate(bearings):
-        draw_path(figure.add_subplot(cells[place]), history, bearing)
-    save(figure, path)
 
 
 def _draw_displacements(tool: Axes, workpiece: Axes, history: History) -> None:

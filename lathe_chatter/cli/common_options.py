@@ -1,0 +1,52 @@
+"""Options that many verbs have, and what several of them say alike."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from collections.abc import Mapping
+from pathlib import Path
+
+from lathe_chatter.cli.console import Screen
+from lathe_chatter.scenario import CLEARED, FLAGGED, Scenario, shipped_scenarios
+
+
+def add_run(parser: ArgumentParser) -> None:
+    """Declare the recorded run that a verb reads."""
+    parser.add_argument(
+        'run_path', type=Path, metavar='RUN', help='folder or file of a recorded run'
+    )
+
+
+def add_json(parser: ArgumentParser) -> None:
+    """Declare that figures may be had as JSON."""
+    parser.add_argument(
+        '--json', action='store_true',
+        help='print the figures as JSON, and all else on standard error',
+    )  # fmt: skip
+
+
+def scenario_help() -> str:
+    """What a scenario may be named by."""
+    return f'a YAML file, or one of {", ".join(shipped_scenarios())}'
+
+
+def verdict(scenario: Scenario, said: Mapping[str, bool | None], screen: Screen) -> int:
+    """Say whether the monitor said what a scenario expects.
+
+    Args:
+        scenario: What was played.
+        said: Whether chatter was FLAGGED, and CLEARED at the end; None where nobody listened.
+        screen: Where to.
+
+    Returns:
+        The exit code: 0 if it did, else 1.
+    """
+    wrong = [word for word, expected in scenario.expect.items() if said[word] != expected]
+    for word in wrong:
+        expected = 'was' if scenario.expect[word] else 'was not'
+        screen.say(f'Chatter {expected} to be {word}, and it is otherwise.', 'bold red')
+    if scenario.expect and not wrong:
+        happened = ' and '.join(word for word in (FLAGGED, CLEARED) if scenario.expect.get(word))
+        story = f'chatter was {happened}' if happened else 'nothing was flagged'
+        screen.say(f'As the scenario expects, {story}.')
+    return 1 if wrong else 0
