@@ -13,6 +13,7 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={f'{NAME}.paper': ['*.j2']},
     python_requires='>=3.10',
     install_requires=[
         'numpy',  # arrays of samples
@@ -20,6 +21,7 @@ setup(
         'numba',  # the inner loop, compiled without a compiler on the machine
         'matplotlib',  # the pictures of a run
         'rich',  # tables and progress bars of the command line
+        'jinja2',  # the page of the reproduction, from a template
         'pyyaml',  # scenario files and metadata.yaml
         'rosbags',  # reads the runs of any rosbag2 writer, and knows the message types
         'mcap',  # writes and reads MCAP
