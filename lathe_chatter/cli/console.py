@@ -10,6 +10,7 @@ import json
 import math
 import os
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
@@ -38,6 +39,8 @@ from lathe_chatter.precompile import precompile
 
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
+_ANY = 10_000
+"""Columns that no table needs."""
 _NARROW = 60
 """Columns of a terminal below which a bar of progress shows no times."""
 
@@ -56,13 +59,22 @@ class Screen:
         """Print JSON, or leave it out."""
         self._json = json
         self._console = Console(stderr=json, markup=False, emoji=False, highlight=False)
+        # A pipe has no width, unless the user says one.
+        self._has_width = self._console.is_terminal or bool(os.environ.get('COLUMNS'))
 
     def say(self, text: str, style: str = '') -> None:
-        """Print text: on a terminal broken between words, elsewhere one line as it is."""
-        self._console.print(
-            Text(text, style=style), overflow='ignore', crop=False,
-            soft_wrap=not self._console.is_terminal,
-        )  # fmt: skip
+        """Print text: on a terminal broken between words, in a pipe one line as it is."""
+        if self._has_width:  # the library would break a path that is longer than a line
+            width = max(self._console.width, 1)
+            lines = [
+                textwrap.fill(
+                    line, width, break_long_words=False, break_on_hyphens=False,
+                    subsequent_indent=' ' * (len(line) - len(line.lstrip())),
+                )
+                for line in text.split('\n')
+            ]  # fmt: skip
+            text = '\n'.join(lines)
+        self._console.print(Text(text, style=style), soft_wrap=True)
 
     def name_file(self, label: str, path: Path) -> None:
         """Print where a file is, unbroken, so that it can be copied."""
@@ -73,7 +85,6 @@ class Screen:
         titles: Mapping[str, str],
         rows: Sequence[Sequence[str]],
         heading: str = '',
-        sections: Sequence[int] = (),
     ) -> None:
         """Print a table, or where it is too wide for the terminal each row as some lines.
 
@@ -82,26 +93,25 @@ class Screen:
                 broken between lines.
             rows: A text for each column.
             heading: Above the table.
-            sections: Rows before which a line is left out.
         """
-        table = Table(box=SIMPLE_HEAD, pad_edge=False)
+        table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
         for title, kind in titles.items():
             table.add_column(
                 Text(title), justify='right' if kind == 'right' else 'left',
                 no_wrap=kind != 'text', overflow='fold',
             )  # fmt: skip
-        for number, row in enumerate(rows):
-            if number in sections:
-                table.add_section()
+        for row in rows:
             table.add_row(*map(Text, row))
         if heading:
             self.say(heading)
-        natural = self._console.measure(table).maximum if rows else 0
+        natural = self._console.measure(
+            table, options=self._console.options.update(width=_ANY)
+        ).maximum
         least = natural - sum(
             _width([title, *cells], whole=True) - _width([title, *cells], whole=kind != 'text')
             for (title, kind), cells in zip(titles.items(), zip(*rows, strict=True), strict=False)
         )
-        if not self._console.is_terminal and not os.environ.get('COLUMNS'):
+        if not self._has_width:
             self._console.print(table, width=max(natural, 1), crop=False)
         elif least <= self._console.width:
             self._console.print(table)
