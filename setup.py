@@ -13,7 +13,7 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={f'{NAME}.paper': ['*.j2']},
+    package_data={NAME: ['py.typed'], f'{NAME}.paper': ['*.j2']},
     python_requires='>=3.10',
     install_requires=[
         'numpy',  # arrays of samples

@@ -1,3 +1,115 @@
-"""A virtual lathe with bearing clearance that cuts, chatters and is recorded in real time."""
+"""A virtual lathe with bearing clearance that cuts, chatters and is recorded in real time.
+
+    import lathe_chatter as lc
+
+gives the names below; each is loaded when it is first used (PEP 562), so that the import itself
+costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lathe_chatter.detection import ChatterDetector, Estimate
+    from lathe_chatter.errors import LatheChatterError, ParameterError
+    from lathe_chatter.knocks import smallest_lasting_knock
+    from lathe_chatter.lathe import Event, EventKind, VirtualLathe
+    from lathe_chatter.lathe.config import LatheConfig
+    from lathe_chatter.lathe.state import LatheState
+    from lathe_chatter.lathe.sweep import LatheSweep
+    from lathe_chatter.model import BearingContact, Cut, Machine, Mode
+    from lathe_chatter.recording import Run, RunWriter, Samples, read_run
+    from lathe_chatter.recording.recover import recover
+    from lathe_chatter.recording.resimulate import resimulate
+    from lathe_chatter.recording.verify import verify
+    from lathe_chatter.report.stability_chart import plot_lobes
+    from lathe_chatter.scenario import Scenario, load_scenario
+    from lathe_chatter.scenario.simulation import simulate
+    from lathe_chatter.stability import (
+        critical_depth,
+        critical_depths,
+        floquet,
+        growth_map,
+        lobe_boundary,
+        recommend_speeds,
+        rightmost_root,
+        rightmost_roots,
+        safe_limit,
+    )
+
+__all__ = [
+    'BearingContact',
+    'ChatterDetector',
+    'Cut',
+    'Estimate',
+    'Event',
+    'EventKind',
+    'LatheChatterError',
+    'LatheConfig',
+    'LatheState',
+    'LatheSweep',
+    'Machine',
+    'Mode',
+    'ParameterError',
+    'Run',
+    'RunWriter',
+    'Samples',
+    'Scenario',
+    'VirtualLathe',
+    '__version__',
+    'critical_depth',
+    'critical_depths',
+    'floquet',
+    'growth_map',
+    'load_scenario',
+    'lobe_boundary',
+    'plot_lobes',
+    'read_run',
+    'recommend_speeds',
+    'recover',
+    'resimulate',
+    'rightmost_root',
+    'rightmost_roots',
+    'safe_limit',
+    'simulate',
+    'smallest_lasting_knock',
+    'verify',
+]
 
 __version__ = '0.1.0'
+
+# fmt: off
+_MODULES = {
+    'detection': ('ChatterDetector', 'Estimate'),
+    'errors': ('LatheChatterError', 'ParameterError'),
+    'knocks': ('smallest_lasting_knock',),
+    'lathe': ('Event', 'EventKind', 'VirtualLathe'),
+    'lathe.config': ('LatheConfig',),
+    'lathe.state': ('LatheState',),
+    'lathe.sweep': ('LatheSweep',),
+    'model': ('BearingContact', 'Cut', 'Machine', 'Mode'),
+    'recording': ('Run', 'RunWriter', 'Samples', 'read_run', 'recover', 'resimulate', 'verify'),
+    'report.stability_chart': ('plot_lobes',),
+    'scenario': ('Scenario', 'load_scenario'),
+    'scenario.simulation': ('simulate',),
+    'stability': (
+        'critical_depth', 'critical_depths', 'floquet', 'growth_map', 'lobe_boundary',
+        'recommend_speeds', 'rightmost_root', 'rightmost_roots', 'safe_limit',
+    ),
+}
+# fmt: on
+_HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    value = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

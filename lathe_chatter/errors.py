@@ -35,6 +35,18 @@ class LayoutError(LatheChatterError, ValueError):
     """A block of samples whose layout is not that of the contract."""
 
 
+class StateError(LatheChatterError, ValueError):
+    """A saved state that cannot be continued from; the text says which and why."""
+
+
+class ScenarioError(LatheChatterError):
+    """A scenario file that cannot be played; the text says what is wrong where."""
+
+
+class KnockMapError(LatheChatterError):
+    """A file that is no map of knocks, or not the one wanted."""
+
+
 def reason_of(error: OSError) -> str:
     """Why the system refused, in its words: without the number and the file, which is known."""
     return error.strerror or str(error)

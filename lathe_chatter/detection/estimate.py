@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from lathe_chatter.detection.speed_advice import Advice
+from lathe_chatter.html_table import html_table
 from lathe_chatter.model import Machine
 
 IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = (
@@ -103,3 +104,20 @@ class Estimate:
     def recommended_speed_rpm(self) -> float:
         """A spindle speed at which the cut would be stable, rev/min."""
         return self.advice.speeds[0].spindle_speed_rpm if self.advice.speeds else math.nan
+
+    def _repr_html_(self) -> str:
+        """As a notebook shows it: what is known."""
+        error = f'{self.growth_rate_error:.2g}'
+        rows: list[tuple[str, object, str]] = [
+            ('state', self.state, ''),
+            ('chatter', 'yes' if self.chatter else 'no', ''),
+            ('works with', self.mode.value, ''),
+            ('time', self.time, 's'),
+            ('growth rate', self.growth_rate, f'1/s, with a standard error of {error}'),
+            ('frequency', self.frequency, 'Hz'),
+            ('amplitude', self.amplitude, 'm'),
+            ('spindle speed', self.spindle_speed_rpm, 'rev/min'),
+            ('cutting stiffness C w', self.cutting_stiffness, 'N/m'),
+            ('recommended speed', self.recommended_speed_rpm, 'rev/min'),
+        ]
+        return html_table('Estimate', [row for row in rows if row[1] == row[1]])

@@ -16,16 +16,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import KnockMapError
 from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
 
 _KIND = 'lathe_chatter knock map 1'
-
-
-class KnockMapError(LatheChatterError):
-    """A file that is no map of knocks, or not the one wanted."""
 
 
 class Point(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe.integrator import propagation, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import steps_per_sample
@@ -25,10 +25,6 @@ _FORMAT = 1
 """Of a saved state; another one is refused."""
 _ROOM = 512
 """Nodes of the surface for which there is room at first."""
-
-
-class StateError(LatheChatterError, ValueError):
-    """A saved state that cannot be continued from; the text says which and why."""
 
 
 @dataclass(eq=False)

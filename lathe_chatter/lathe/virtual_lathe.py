@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe.integrator import propagation, stepper, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import constants_of
-from lathe_chatter.lathe.state import LatheState, StateError, differences
+from lathe_chatter.lathe.state import LatheState, differences
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity, count_of

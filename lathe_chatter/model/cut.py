@@ -86,6 +86,12 @@ class Cut:
             raise ParameterError('the name of a changed value', unknown, '', allowed)
         return replace(self, **changes)
 
+    def _repr_html_(self) -> str:
+        """As a notebook shows it."""
+        from lathe_chatter.model.parameter_table import html_of
+
+        return html_of(self)
+
 
 def paper_initial_state(cut: Cut) -> Array:
     """The paper's history at t = 0: both bodies displaced by f/1000 and moving with v (4,)."""

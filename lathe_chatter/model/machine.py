@@ -120,3 +120,9 @@ class Machine:
         b[1, 0], b[1, 2] = on_tool, -on_tool
         b[3, 0], b[3, 2] = -on_workpiece, on_workpiece
         return a, b, np.array([0.0, 0.0, 0.0, bearing])
+
+    def _repr_html_(self) -> str:
+        """As a notebook shows it."""
+        from lathe_chatter.model.parameter_table import html_of
+
+        return html_of(self)

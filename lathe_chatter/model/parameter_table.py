@@ -14,6 +14,7 @@ from enum import Enum
 from typing import Any, TypeGuard
 
 from lathe_chatter.errors import ParameterError, nearest_name
+from lathe_chatter.html_table import html_table
 from lathe_chatter.model.quantities import Quantity, check_choice, quantity_of
 
 Value = bool | int | float | str | list[str]
@@ -197,6 +198,12 @@ def rows_of(instance: Any, *, prefix: str = '', run_time: bool = False) -> Itera
             yield Row(name, value.value, meaning, choices=type(value), run_time=run_time)
         elif limits is not None:
             yield Row(name, value, limits.meaning, limits, run_time=run_time)
+
+
+def html_of(instance: Any) -> str:
+    """A frozen value of the model as the table that a notebook shows."""
+    rows = ((row.name, row.default, row.unit) for row in rows_of(instance))
+    return html_table(type(instance).__name__, rows)
 
 
 def _shown(value: Value) -> str:

@@ -16,7 +16,7 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, paper_initial_state
 from lathe_chatter.paper.reproduction import SAMPLE_RATE, paper_lathe
 from lathe_chatter.paper.runs import PAPER_RUNS, PaperRun, run_named, run_shown_in
-from lathe_chatter.report.style import TOOL, WORKPIECE, grid, new_figure, save, scale_for
+from lathe_chatter.plot_style import TOOL, WORKPIECE, grid, new_figure, save, scale_for
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.paper.findings import Findings
 from lathe_chatter.paper.reproduction import SAMPLE_RATE, Reproduced, paper_lathe
+from lathe_chatter.plot_style import OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
-from lathe_chatter.report.style import OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.stability import safe_limit
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 
 from lathe_chatter.knocks import KnockMap, Margin
 from lathe_chatter.knocks.knock_map import Point
+from lathe_chatter.plot_style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
-from lathe_chatter.report.style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.stability import safe_limit
 
 if TYPE_CHECKING:

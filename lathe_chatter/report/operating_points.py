@@ -7,9 +7,9 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.plot_style import ALARM
 from lathe_chatter.report.history import History
 from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
-from lathe_chatter.report.style import ALARM
 from lathe_chatter.stability import safe_limit
 
 if TYPE_CHECKING:

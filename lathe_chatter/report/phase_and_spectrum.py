@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for
 from lathe_chatter.report.history import History
 from lathe_chatter.report.signal_views import Excerpt
-from lathe_chatter.report.style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for
 from lathe_chatter.stability import contact_at, rightmost_root
 
 if TYPE_CHECKING:

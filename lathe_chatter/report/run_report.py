@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lathe_chatter.plot_style import new_figure, save
 from lathe_chatter.report.history import History
 from lathe_chatter.report.operating_points import bearings_of, draw_path
 from lathe_chatter.report.phase_and_spectrum import draw_portrait, draw_section, draw_spectrum
 from lathe_chatter.report.signal_views import excerpts_of
-from lathe_chatter.report.style import new_figure, save
 from lathe_chatter.report.time_histories import draw_time_histories
 
 

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.model import BearingContact, Cut
-from lathe_chatter.report.style import LINE, OPEN, SAFE, SEATED, grid, new_figure, save
-from lathe_chatter.stability import GrowthMap, SafeLimit
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.plot_style import LINE, OPEN, SAFE, SEATED, axes_or_new, grid, new_figure, save
+from lathe_chatter.stability import GrowthMap, SafeLimit, safe_limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,6 +72,40 @@ def draw_chart(
             f'{cut.speed_variation_frequency:g} Hz'
         )
     axes.set_title(text, fontsize=11)
+
+
+def plot_lobes(
+    machine: Machine | None = None,
+    cut: Cut | None = None,
+    spindle_speed_rpm: ArrayLike | None = None,
+    *,
+    axes: Axes | None = None,
+) -> Axes:
+    """Plot the limits and the safe region of a machine, its cut as a point.
+
+    Args:
+        machine: Tool, workpiece, bearing and material; by default the paper's.
+        cut: Clearance, contact, feed speed, and the point; by default the usual one.
+        spindle_speed_rpm: Rising speeds, rev/min; by default from a third of the cut's to three
+            times as much.
+        axes: To draw into; by default those of a new figure.
+
+    Returns:
+        The axes.
+    """
+    machine, cut = machine or Machine(), cut or Cut()
+    speed = cut.spindle_speed_rpm
+    speeds = chart_speeds(speed / 3.0, speed * 3.0)
+    if spindle_speed_rpm is not None:
+        speeds = np.asarray(spindle_speed_rpm, float)
+    limits = safe_limit(machine, cut, speeds)
+    edges = [limits.open_limit, limits.seated_limit, limits.depth_of_cut]
+    finite = [edge[np.isfinite(edge)] for edge in edges]
+    highest = max((float(np.median(edge)) for edge in finite if len(edge)), default=0.0)
+    top = max(2.0 * highest, 1.2 * cut.depth_of_cut)
+    axes = axes_or_new(axes)
+    draw_chart(axes, cut, limits, None, top)
+    return axes
 
 
 def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:

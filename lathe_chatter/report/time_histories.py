@@ -10,8 +10,7 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
 from lathe_chatter.model import BearingContact
-from lathe_chatter.report.history import History
-from lathe_chatter.report.style import (
+from lathe_chatter.plot_style import (
     ALARM,
     ALARM_TEXT,
     KNOCK,
@@ -22,6 +21,7 @@ from lathe_chatter.report.style import (
     grid,
     scale_for,
 )
+from lathe_chatter.report.history import History
 from lathe_chatter.stability import contact_at, rightmost_root
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from lathe_chatter.errors import LatheChatterError, ParameterError, nearest_name, reason_of
+from lathe_chatter.errors import ParameterError, ScenarioError, nearest_name, reason_of
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.model.quantities import Quantity
 
@@ -20,10 +20,6 @@ RECOMMENDED = 'recommended'
 """Stands for the speed that the monitor recommends."""
 FLAGGED, CLEARED = 'flagged', 'cleared'
 _TIME = Quantity('a time', 's', high=86400.0)
-
-
-class ScenarioError(LatheChatterError):
-    """A scenario file that cannot be played; the text says what is wrong where."""
 
 
 @dataclass(frozen=True)

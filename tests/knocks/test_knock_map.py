@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from lathe_chatter.errors import KnockMapError
 from lathe_chatter.knocks import KnockGrid, Margin, read_knock_map, run_knock_map
-from lathe_chatter.knocks.knock_map import KnockMapError
 from lathe_chatter.lathe.config import LatheConfig, config_from
 
 GRID = KnockGrid(

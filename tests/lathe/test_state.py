@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.state import LatheState, StateError
+from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.model.lathe_setup import LatheSetup
 

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe import EventKind, VirtualLathe
-from lathe_chatter.lathe.state import StateError
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 
 _NOISY = Cut(3017.0, 0.8e-3, force_noise=0.05, sensor_noise=1e-7, runout=2e-6)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from lathe_chatter.errors import ScenarioError
 from lathe_chatter.model import Cut
 from lathe_chatter.scenario import (
     RECOMMENDED,
-    ScenarioError,
     Step,
     find_scenario,
     load_scenario,

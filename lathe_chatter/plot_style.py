@@ -68,6 +68,16 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def axes_or_new(axes: Axes | None) -> Axes:
+    """Axes to draw into: those given, or of a figure of pyplot's, which a notebook shows."""
+    if axes is not None:
+        return axes
+    from matplotlib import pyplot as plt
+
+    made: Axes = plt.subplots(layout='constrained')[1]
+    return made
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as PNG and, beside it, as SVG with its text as text."""
     from matplotlib import rc_context

@@ -1,0 +1,70 @@
+"""`import lathe_chatter as lc`: what it gives, and that it costs nothing until it is used."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+import lathe_chatter as lc
+from lathe_chatter.html_table import html_table
+from lathe_chatter.samples import SAMPLE_COLUMNS
+
+
+def loaded_by(statement: str) -> set[str]:
+    """The modules that a fresh interpreter loads for a statement."""
+    call = [sys.executable, '-X', 'importtime', '-c', statement]
+    told = subprocess.run(call, check=True, capture_output=True, text=True).stderr
+    return {line.rpartition('|')[2].strip() for line in told.splitlines()}
+
+
+def test_the_import_loads_nothing_but_itself() -> None:
+    """Less than 50 ms by far, whatever else the machine does."""
+    more = loaded_by('import lathe_chatter') - loaded_by('import importlib, typing')
+    assert more == {'lathe_chatter'}
+
+
+@pytest.mark.parametrize('name', lc.__all__)
+def test_every_name_is_there(name: str) -> None:
+    assert name in dir(lc)
+    assert getattr(lc, name) is getattr(lc, name)
+
+
+def test_a_name_that_is_not_there_is_named() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'Lathe'"):
+        _ = lc.Lathe
+
+
+def test_the_names_for_type_checkers_are_those_of_the_table() -> None:
+    assert {*lc._HOME, '__version__'} == set(lc.__all__)
+    assert lc.__file__ is not None
+    source = ast.parse(Path(lc.__file__).read_text(encoding='utf-8'))
+    (block,) = (node for node in source.body if isinstance(node, ast.If))
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    assert sorted(each.name for node in imports for each in node.names) == sorted(lc._HOME)
+
+
+def test_values_show_themselves_in_a_notebook() -> None:
+    machine = lc.Machine(lc.Mode(2.0, 1900.0, 0.03))._repr_html_()
+    assert (
+        '<td style="text-align:left">tool.mass</td><td style="text-align:right">2</td>' in machine
+    )
+    assert 'N/m2' in machine
+    assert 'bearing_contact' in lc.Cut()._repr_html_()
+    estimate = lc.ChatterDetector().update(lc.VirtualLathe().advance(500), SAMPLE_COLUMNS)
+    assert 'nan' not in estimate._repr_html_()
+    assert '&lt;' in html_table('<', [])
+
+
+def test_lobes_are_plotted_into_the_axes_given() -> None:
+    axes = Figure().subplots()
+    assert lc.plot_lobes(axes=axes) is axes
+    assert [line.get_label() for line in axes.lines][:2] == [
+        'limit, open',
+        'limit, on its bearing',
+    ]
+    assert axes.get_ylim()[1] > 0.5
