@@ -44,6 +44,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.crc import crc32
 from lathe_chatter.recording.disk_thread import FileSync
+from lathe_chatter.recording.provenance import sealed
 
 MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 """Opcode, length, channel, sequence, log time, publish time; the message follows."""
@@ -244,8 +245,8 @@ class CommittedFile:
         self._contents = self._contents.with_chunk(closed)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add named values, outside the stream of messages."""
-        data = record_bytes(Metadata(name=name, metadata=dict(values)))
+        """Add named values with their check, outside the stream of messages."""
+        data = record_bytes(Metadata(name=name, metadata=sealed(name, values)))
         index = MetadataIndex(offset=self._end, length=len(data), name=name)
         self._other_indexes += record_bytes(index)
         self._metadata += 1

@@ -15,6 +15,9 @@ from typing import Any
 
 from lathe_chatter import __version__
 
+OURS = 'lathe_chatter/'
+"""With which the names of our records begin; in a file where one has its check, all have."""
+
 IDENTITY = 'lathe_chatter/made_by'
 """Name of the MCAP metadata record in each file of a run."""
 PARAMETERS = 'lathe_chatter/parameters'
@@ -31,6 +34,10 @@ PUBLISHERS = 'lathe_chatter/publishers'
 
 STALLS = 'stalls'
 """Among these, how often the recorder took too long to take what had come."""
+
+CHECK = 'check'
+"""Name of the value in each record that tells whether the others are as they were written: no CRC
+of MCAP covers a metadata record by itself, and none at all while a run is not finished."""
 
 RECOVERED = 'lathe_chatter/recovered'
 """Name of the record of a run that was recovered: from which, and what could not be read."""
@@ -76,6 +83,22 @@ def identity() -> dict[str, str]:
         'command': ' '.join(sys.argv),
         'started': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
     }
+
+
+def sealed(name: str, values: Mapping[str, str]) -> dict[str, str]:
+    """The values of a record with their check, which `checked` compares."""
+    return {CHECK: _digest(name, values), **{k: v for k, v in values.items() if k != CHECK}}
+
+
+def checked(name: str, values: Mapping[str, str]) -> bool | None:
+    """Whether a record is as it was written; None where it has no check, as of other writers."""
+    return values[CHECK] == _digest(name, values) if CHECK in values else None
+
+
+def _digest(name: str, values: Mapping[str, str]) -> str:
+    """Of a record: its name, and every value by its name."""
+    content = [name, sorted((key, text) for key, text in values.items() if key != CHECK)]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def parameter_values(answers: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:

@@ -19,6 +19,7 @@ from mcap.records import Attachment, Metadata
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
 from lathe_chatter.recording.mcap_reader import Chunk, Damage, Plain, Wanted, scan
 from lathe_chatter.recording.mcap_summary import Summary, add_record, body_is_sound, read_summary
+from lathe_chatter.recording.provenance import CHECK, OURS, checked
 
 _RECORD = struct.Struct('<BQ')
 _LOOSE_AT_ONCE = 1 << 20
@@ -130,9 +131,21 @@ class RecordedFile:
             yield contents._replace(first=first)
 
     def notes(self) -> Iterator[Note]:
-        """Every note, in order."""
-        for record in self._plain(Opcode.METADATA, Metadata):
-            yield Note(record.name, dict(record.metadata))
+        """Every note, in order; one that is not as it was written is damage."""
+        records = [*self._plain(Opcode.METADATA, Metadata)]
+        have_checks = any(CHECK in record.metadata for record in records)
+        for record in records:
+            values = dict(record.metadata)
+            sound = checked(record.name, values)
+            if sound is None:
+                sound = not (have_checks and record.name.startswith(OURS))
+            if not sound:
+                end = self.path.stat().st_size
+                reason = f'the note {record.name} is not as it was written'
+                self.on_damage(Damage(self.path, end, end, reason))
+                continue
+            values.pop(CHECK, None)
+            yield Note(record.name, values)
 
     def attachments(self) -> Iterator[Any]:
         """Every attachment, as mcap has it, in order."""
