@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from lathe_chatter.model.cut import BearingContact, Cut, paper_initial_state
-from lathe_chatter.model.machine import Machine, Mode
+from lathe_chatter.model.machine import Body, Machine, Mode, Structure
 
-__all__ = ['BearingContact', 'Cut', 'Machine', 'Mode', 'paper_initial_state']
+__all__ = ['BearingContact', 'Body', 'Cut', 'Machine', 'Mode', 'Structure', 'paper_initial_state']

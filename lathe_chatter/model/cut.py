@@ -33,9 +33,9 @@ class Cut:
     """
 
     spindle_speed_rpm: float = quantity(
-        'spindle speed', 'rev/min', default=3000.0, low=60.0, high=30000.0
+        'spindle speed', 'rev/min', default=3000.0, low=1.0, high=1e5
     )
-    depth_of_cut: float = quantity('depth of cut w', 'm', default=0.0005, high=0.01)
+    depth_of_cut: float = quantity('depth of cut w', 'm', default=0.0005, high=0.1)
     bearing_clearance: float = quantity('bearing clearance gamma', 'm', default=5e-6, high=0.001)
     bearing_contact: BearingContact = BearingContact.GAP
     feed_speed: float = quantity('feed speed', 'm/s', default=0.0025, high=0.1)

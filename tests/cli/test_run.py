@@ -181,7 +181,7 @@ def test_a_refused_step_ends_the_run_with_the_reason(
     )
     assert done.returncode == 2, f'{done.stdout}{done.stderr} {time.monotonic() - began}'
     assert 'depth_of_cut' in done.stderr
-    assert '0.01 m' in done.stderr
+    assert '0.1 m' in done.stderr
     assert 'Traceback' not in done.stdout + done.stderr
 
 

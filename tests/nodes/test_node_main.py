@@ -18,10 +18,10 @@ LATHE = 'lathe_chatter.nodes.lathe_node'
 MONITOR = 'lathe_chatter.nodes.monitor_node'
 WRONG = {
     (LATHE, 'depth_of_cut:=nan'): (
-        'depth_of_cut is nan m: it must be a finite number from 0 to 0.01 m.'
+        'depth_of_cut is nan m: it must be a finite number from 0 to 0.1 m.'
     ),
     (LATHE, 'depth_of_cut:=deep'): (
-        "depth_of_cut is 'deep' m: it must be a finite number from 0 to 0.01 m."
+        "depth_of_cut is 'deep' m: it must be a finite number from 0 to 0.1 m."
     ),
     (LATHE, 'bearing_contact:=loose'): (
         "bearing_contact is 'loose': it must be one of none, gap, seated."
@@ -68,7 +68,7 @@ def test_a_node_explains_itself_and_takes_no_word_that_it_does_not_know() -> Non
         [*command, '--help'], check=False, capture_output=True, text=True, timeout=60
     )
     assert told.returncode == 0
-    assert 'depth_of_cut: depth of cut w; a finite number from 0 to 0.01 m (default: 0.0005)' in (
+    assert 'depth_of_cut: depth of cut w; a finite number from 0 to 0.1 m (default: 0.0005)' in (
         told.stdout
     )
     wrong = subprocess.run(

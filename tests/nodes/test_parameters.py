@@ -156,7 +156,7 @@ def test_the_table_of_a_readme_has_every_row() -> None:
     lines = LATHE.markdown().splitlines()
     assert len(lines) == 2 + len(list(LATHE))
     assert len({line.count('|') for line in lines}) == 1
-    assert ('| `depth_of_cut` | 0.0005 | from 0 to 0.01 m | run time | depth of cut w |') in lines
+    assert ('| `depth_of_cut` | 0.0005 | from 0 to 0.1 m | run time | depth of cut w |') in lines
 
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -109,7 +109,7 @@ def test_the_least_that_a_scenario_needs_is_its_duration(tmp_path: Path) -> None
         ),
         ('duration: 1\nsteps: [{at: 2, set: {runout: 0}}]', 'the run ends at 1 s'),
         ('duration: 1\nsteps: [{at: 1, set: {runout: deep}}]', "step 1: runout is 'deep' m"),
-        ('duration: 1\nsteps: [{at: 1, set: {depth_of_cut: 5}}]', 'from 0 to 0.01 m'),
+        ('duration: 1\nsteps: [{at: 1, set: {depth_of_cut: 5}}]', 'from 0 to 0.1 m'),
         ('duration: 1\nsteps: [{at: 1, set: {sample_rate: 5}}]', "'sample_rate' cannot change"),
         ('duration: 1\nsteps: [{at: 1, set: {depth: 5}}]', 'did you mean depth_of_cut?'),
         ('duration: 1\nsteps: [{at: 1, set: {zzz: 5}}]', 'what can change is'),
