@@ -27,11 +27,11 @@ setup(
         'mcap',  # writes and reads MCAP
         'lz4',  # the compression of the chunks of a run
         'zstandard',  # that of runs written by others
+        'isal',  # the CRCs of a run in a quarter of the time that zlib takes
     ],
     # A run in other hands; each is asked for only where it is used.
     extras_require={
         'export': ['pyarrow', 'pandas', 'xarray'],
-        'fast': ['isal'],  # the CRCs of a run in a quarter of the time
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),

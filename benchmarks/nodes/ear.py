@@ -11,9 +11,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray
 
-from lathe_chatter.nodes.messages import BlockReader, samples_from_message
 from lathe_chatter.nodes.node_main import make_executor
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.samples.continuity import Continuity
 
 DEEP = QoSProfile(depth=5000)
@@ -29,12 +29,13 @@ class Ear:
         self.executor = make_executor(self.node, by_events=False)
         self.executor.add_node(self.node)
         self.heard = Continuity()
+        self._decoder = SampleDecoder()
         self.sent: list[int] = []
         self.ends: list[float] = []
 
     def listen_to_samples(self, topic: str = '/lathe/samples') -> None:
         """Note every block of samples from now on."""
-        self.node.create_subscription(Float64MultiArray, topic, self._note, DEEP)
+        self.node.create_subscription(Float64MultiArray, topic, self._note, DEEP, raw=True)
 
     def drain_samples(self, until: float, period: float = 0.01) -> Iterator[None]:
         """Follow the samples up to a simulated time, s; hands over after each look at them.
@@ -42,17 +43,17 @@ class Ear:
         At ten thousand blocks a second a callback for each is too slow.
         """
         samples = PolledSubscription(self.node, Float64MultiArray, '/lathe/samples', _DEEPEST)
-        reader = BlockReader()
+        decoder = SampleDecoder()
         while (self.heard.last or 0.0) < until:
             for serialised, _info in samples.take():
-                block, _columns = reader.read(serialised)
+                block, _columns = decoder.decode(serialised)
                 self.heard.join(block[:, 0])
             yield
             time.sleep(period)
         samples.end()
 
-    def _note(self, message: Float64MultiArray, info: dict[str, int]) -> None:
-        samples, _columns = samples_from_message(message)
+    def _note(self, data: bytes, info: dict[str, int]) -> None:
+        samples, _columns = self._decoder.decode(data)
         self.heard.join(samples[:, 0])
         self.sent.append(info['source_timestamp'])
         self.ends.append(float(samples[-1, 0]))

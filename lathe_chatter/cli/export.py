@@ -9,7 +9,8 @@ from pathlib import Path
 from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import read_run
-from lathe_chatter.recording.export import Selection, seam_sentences, to_csv, to_parquet, unroll
+from lathe_chatter.recording.export import discontinuity_sentences, to_csv, to_parquet, unroll
+from lathe_chatter.recording.sample_series import Selection
 
 NAME = 'export'
 HELP = 'write the samples of a recorded run as CSV, Parquet, or one message per sample'
@@ -58,15 +59,15 @@ def run(options: Namespace) -> int:
     total = recorded.count_of_samples(options.topic)
     with screen.progress('samples', total) as bar, writing(path):
         done = _FORMATS[form](recorded, path, chosen, bar.advance)
-    for sentence in seam_sentences(done):
+    for sentence in discontinuity_sentences(done):
         screen.say(f'note   {sentence}')
     screen.say(f'{done.samples} samples in {path}')
     screen.json(
         {
             'path': path,
             'samples': done.samples,
-            'gaps': done.seams.gaps,
-            'restarts': done.seams.restarts,
+            'gaps': done.continuity.gap_places,
+            'restarts': done.continuity.restart_places,
         }
     )
     return 0

@@ -14,9 +14,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.nodes.messages import Wire, joint_states, time_message
+from lathe_chatter.nodes.messages import joint_states, time_message
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import encode_block, encode_number
 
 _SCALARS = {
     '~/tool/displacement': SAMPLE_COLUMNS.index('tool_displacement'),
@@ -60,7 +61,6 @@ class LatheTopics:
         deep = max(in_real_time, min(faster, MAX_HISTORY))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._samples = publisher(Float64MultiArray, '~/samples', kept)
-        self._wire = Wire()
         self._scalars = [
             (publisher(Float64, topic, QoSProfile(depth=deep)), column)
             for topic, column in _SCALARS.items()
@@ -78,11 +78,11 @@ class LatheTopics:
             samples: (n, 8), n > 0.
             stamp: Simulated time of the last, ns.
         """
-        self._samples.publish(self._wire.block(samples))
+        self._samples.publish(encode_block(samples))
         self._look_around()
         last = samples[-1]
         for publisher, column in self._heard_scalars:
-            publisher.publish(self._wire.number(last[column]))
+            publisher.publish(encode_number(last[column]))
         if self._heard_joints:
             self._joints.publish(joint_states(last, stamp))
         self.publish_clock(stamp)

@@ -28,7 +28,7 @@ from lathe_chatter.nodes.real_time import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine
 from lathe_chatter.nodes.sample_stream import Fed, SampleFeed
 from lathe_chatter.precompile import precompile
-from lathe_chatter.samples.continuity import Continuity, Joint, times_of
+from lathe_chatter.samples.continuity import BlockOrder, Continuity, times_of
 
 _REST = 40_000_000
 """ns that the node lets samples come in before it looks at them together."""
@@ -133,19 +133,19 @@ class MonitorNode(ParameterNode):
     def _follow(self, times: Array) -> None:
         """Notice lost samples and a lathe that has started again."""
         before = self._continuity.last
-        joint = self._continuity.join(times, self._feed.is_another_lathe)
-        if joint in {Joint.FIRST, Joint.RESTART}:
+        order = self._continuity.join(times, self._feed.is_another_lathe)
+        if order in {BlockOrder.FIRST, BlockOrder.RESTART}:
             self._feed.know_lathe()
             self._since = f'{times[0]:.6f}'
-        if joint is Joint.FIRST:
+        if order is BlockOrder.FIRST:
             self.get_logger().info(f'Listening from {self._since} s on.')
-        elif joint is Joint.RESTART:
+        elif order is BlockOrder.RESTART:
             again = f'the lathe started again, and I with it from {self._since} s on'
             self.get_logger().info(f'At {before:.6f} s: {again}.')
             self._begin_again()
             if self._asked is not None:
                 self._asked.ask()  # it may be another machine
-        elif joint is Joint.GAP:
+        elif order is BlockOrder.GAP:
             self.get_logger().warning(
                 f'At {before:.6f} s: the samples up to {times[0]:.6f} s did not come.'
             )

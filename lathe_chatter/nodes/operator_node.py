@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.messages import samples_from_message
+from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step
 from lathe_chatter.scenario.player import ScenarioPlayer
 
@@ -62,7 +62,10 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         self._client = self.create_client(
             SetParametersAtomically, 'lathe/set_parameters_atomically'
         )
-        self.create_subscription(Float64MultiArray, 'lathe/samples', self._on_samples, _NEWEST)
+        self._decoder = SampleDecoder()
+        self.create_subscription(
+            Float64MultiArray, 'lathe/samples', self._on_samples, _NEWEST, raw=True
+        )
         # The monitor publishes its figures before the flag that they explain. Of what is ready
         # together the executor serves first what was subscribed to first.
         for name in _ESTIMATES:
@@ -79,10 +82,10 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
 
     # -- listening -------------------------------------------------------------------------
 
-    def _on_samples(self, message: Float64MultiArray) -> None:
+    def _on_samples(self, data: bytes) -> None:
         if not self.playing:
             return
-        samples, columns = samples_from_message(message)
+        samples, columns = self._decoder.decode(data)
         self.time = float(samples[-1, columns.index('time')])
         if not self._in_flight:
             step = self.player.due(self.time, self._estimates['recommended_speed_rpm'])

@@ -34,7 +34,7 @@ from lathe_chatter.recording.provenance import (
 from lathe_chatter.recording.receive_stalls import ReceiveStalls
 from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
-from lathe_chatter.samples.continuity import Joint
+from lathe_chatter.samples.continuity import BlockOrder
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""
@@ -258,7 +258,7 @@ class RecorderNode(ParameterNode):
     def _log_news(self) -> None:
         """Say from when there are samples, and where they are missing."""
         for topic, received in self._log.samples.items():
-            if any(each.joint is Joint.RESTART for each in received.discontinuities):
+            if any(each.order is BlockOrder.RESTART for each in received.discontinuities):
                 self._snapshots.want_again(topic.removesuffix('/samples'))
         for sentence in news(self._log):
             self.get_logger().info(sentence)

@@ -9,7 +9,7 @@ from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
 from lathe_chatter.recording.receive_stalls import ReceiveStalls
 from lathe_chatter.recording.run_log import Discontinuity, RunLog
-from lathe_chatter.samples.continuity import Joint
+from lathe_chatter.samples.continuity import BlockOrder
 
 
 def recording_status(
@@ -59,9 +59,9 @@ def news(log: RunLog) -> Iterator[str]:
         log: Of the run; the discontinuities that are said are taken away.
     """
     for name, received in log.samples.items():
-        gaps = [place for place in received.discontinuities if place.joint is Joint.GAP]
+        gaps = [place for place in received.discontinuities if place.order is BlockOrder.GAP]
         for place in received.discontinuities:
-            if place.joint is not Joint.GAP:
+            if place.order is not BlockOrder.GAP:
                 yield f'{name} {_begins(place)}.'
         if gaps:  # there may be many
             missing = sum(place.missing for place in gaps)
@@ -74,7 +74,7 @@ def news(log: RunLog) -> Iterator[str]:
 
 def _begins(place: Discontinuity) -> str:
     since = f'is recorded from {place.after:.6f} s on'
-    if place.joint is Joint.RESTART:
+    if place.order is BlockOrder.RESTART:
         since = f'{since}, after the lathe started again at {place.before:.6f} s'
     return f'{since}, without the {place.missing} samples before' if place.missing else since
 

@@ -13,8 +13,8 @@ from std_msgs.msg import Float64MultiArray
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.messages import BlockReader
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.samples.continuity import follow_evenly
 
 _TOPIC = 'lathe/samples'
@@ -49,7 +49,7 @@ class SampleFeed:
     def __init__(self, node: Node, complain: Callable[[LatheChatterError], None]) -> None:
         """Subscribe."""
         self._complain = complain
-        self._reader = BlockReader()
+        self._decoder = SampleDecoder()
         self._known: frozenset[tuple[int, ...]] = frozenset()
         self._messages = PolledSubscription(
             node,
@@ -74,7 +74,7 @@ class SampleFeed:
         count = 0
         for serialised, _info in self._messages.take():
             try:
-                samples, columns = self._reader.read(serialised)
+                samples, columns = self._decoder.decode(serialised)
             except LatheChatterError as error:
                 self._complain(error)
                 continue

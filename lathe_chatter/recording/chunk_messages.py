@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,9 +41,9 @@ class Messages(NamedTuple):
     starts: Integers
     others: list[int]
 
-    def of(self, channel: int) -> Messages:
-        """Those of one channel."""
-        mine = self.heads['channel'] == channel
+    def of(self, *channels: int) -> Messages:
+        """Those of some channels."""
+        mine = np.isin(self.heads['channel'], channels)
         return self._replace(heads=self.heads[mine], starts=self.starts[mine])
 
     @property
@@ -58,17 +57,6 @@ class Messages(NamedTuple):
         return self.records[start : start + int(self.sizes[place])]
 
 
-def joined_messages(parts: Sequence[Messages]) -> Messages:
-    """The messages of several chunks as if they were of one."""
-    begins = np.cumsum([0, *(len(part.records) for part in parts[:-1])])
-    return Messages(
-        b''.join(part.records for part in parts),
-        np.concatenate([part.heads for part in parts]),
-        np.concatenate([part.starts + begin for part, begin in zip(parts, begins, strict=True)]),
-        [],
-    )
-
-
 def messages_of(chunk: Chunk) -> Messages:
     """All messages of a chunk, in the order in which they were written.
 
@@ -80,58 +68,60 @@ def messages_of(chunk: Chunk) -> Messages:
         ValueError: If the records do not follow each other; their CRC was right, so they were
             written that way.
     """
-    found = _by_indexes(chunk)
-    if found is None:
-        offsets, others = _by_walking(chunk.records, 0, len(chunk.records))
-        heads = _heads(chunk.records, offsets)
-    else:
-        offsets, heads, others = found
-    return Messages(chunk.records, heads, offsets + HEAD.itemsize, others)
+    return _by_indexes(chunk) or _by_walking(chunk.records, 0, len(chunk.records))
 
 
-def _heads(records: bytes, offsets: Integers) -> NDArray[Any]:
-    """The heads at any offsets, aligned or not."""
+def heads_at(records: bytes, offsets: Integers) -> NDArray[Any] | None:
+    """The heads of messages at increasing offsets; None if not at each is another message."""
     if not len(offsets):
         return np.zeros(0, HEAD)
+    if offsets[0] < 0 or offsets[-1] > len(records) - HEAD.itemsize:
+        return None
+    if (offsets[1:] < offsets[:-1]).any():
+        return None
     every: NDArray[Any] = np.ndarray(
         (len(records) - HEAD.itemsize + 1,), HEAD, buffer=records, strides=(1,)
     )
     heads: NDArray[Any] = every[offsets]
-    return heads
+    lengths = heads['length'].astype(np.int64)
+    ends = offsets + (lengths + _BEFORE)
+    if (
+        lengths.min() < HEAD.itemsize - _BEFORE
+        or (ends[:-1] > offsets[1:]).any()
+        or ends[-1] > len(records)
+    ):
+        return None
+    return heads if (heads['opcode'] == Opcode.MESSAGE).all() else None
 
 
-def _by_indexes(chunk: Chunk) -> tuple[Integers, NDArray[Any], list[int]] | None:
-    """Offsets and heads of messages, and offsets of other records; None if they are not told."""
+def _by_indexes(chunk: Chunk) -> Messages | None:
+    """By the message indexes; None if they do not lead to everything that is there."""
     if not chunk.indexes or any(len(index) % 16 for index in chunk.indexes.values()):
         return None
-    pairs = np.frombuffer(b''.join(chunk.indexes.values()), '<u8')
-    offsets = pairs[1::2].astype(np.int64)
+    offsets = np.frombuffer(b''.join(chunk.indexes.values()), '<u8')[1::2].astype(np.int64)
     if len(chunk.indexes) > 1:  # that of one channel is in order
         offsets.sort()
-    size = len(chunk.records)
-    if not len(offsets) or offsets.min() < 0 or offsets.max() > size - HEAD.itemsize:
-        return None
-    heads = _heads(chunk.records, offsets)
-    ends = offsets + heads['length'].astype(np.int64) + _BEFORE
-    if not np.all(heads['opcode'] == Opcode.MESSAGE):
+    heads = heads_at(chunk.records, offsets)
+    if heads is None:
         return None
     # What lies between two messages, before the first and after the last.
+    ends = offsets + (heads['length'].astype(np.int64) + _BEFORE)
     begins = np.concatenate((np.zeros(1, np.int64), ends))
-    stops = np.concatenate((offsets, np.full(1, size)))
+    stops = np.concatenate((offsets, np.full(1, len(chunk.records))))
     others: list[int] = []
     for place in np.flatnonzero(begins != stops):
         try:
-            between, more = _by_walking(chunk.records, int(begins[place]), int(stops[place]))
+            between = _by_walking(chunk.records, int(begins[place]), int(stops[place]))
         except ValueError:
             return None
-        if len(between):
+        if len(between.heads):
             return None
-        others += more
-    return offsets, heads, others
+        others += between.others
+    return Messages(chunk.records, heads, offsets + HEAD.itemsize, others)
 
 
-def _by_walking(records: bytes, start: int, stop: int) -> tuple[Integers, list[int]]:
-    """Offsets of messages and of other records from one place to another."""
+def _by_walking(records: bytes, start: int, stop: int) -> Messages:
+    """The messages from one place to another, from record to record."""
     messages: list[int] = []
     others: list[int] = []
     while start < stop:
@@ -142,4 +132,8 @@ def _by_walking(records: bytes, start: int, stop: int) -> tuple[Integers, list[i
         start += _BEFORE + length
     if start != stop:
         raise ValueError('The records of a chunk do not end where it does.')
-    return np.array(messages, dtype=np.int64), others
+    offsets = np.array(messages, dtype=np.int64)
+    heads = heads_at(records, offsets)
+    if heads is None:
+        raise ValueError('A message of a chunk is shorter than its head.')
+    return Messages(records, heads, offsets + HEAD.itemsize, others)

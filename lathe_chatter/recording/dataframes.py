@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.recording.sample_series import Samples
 from lathe_chatter.samples import SAMPLE_COLUMNS
-
-if TYPE_CHECKING:
-    from lathe_chatter.recording.run import Run
-    from lathe_chatter.recording.sample_series import Samples
 
 UNITS: Mapping[str, str] = dict(
     zip(SAMPLE_COLUMNS, ('s', 'rev', 'm', 'm/s', 'm', 'm/s', 'm', 'N'), strict=True)
 )
 """SI, and revolutions."""
-_TIME = 'time'
 
 
 class MissingPackageError(LatheChatterError):
@@ -40,48 +37,35 @@ def optional(name: str, use: str) -> Any:
         raise MissingPackageError(name, use) from None
 
 
-def to_pandas(run: Run, **chosen: Any) -> Any:
-    """The samples as a DataFrame by simulated time, s.
-
-    Args:
-        run: The run.
-        chosen: Topic, columns, start and end, as for `Run.samples`.
+def to_pandas(samples: Samples) -> Any:
+    """Samples, with their time, as a DataFrame by simulated time, s.
 
     Returns:
         A DataFrame; `attrs` holds the units, and the gaps and restarts, which it joins.
 
     Raises:
         MissingPackageError: If pandas is not installed.
-        RunReadError: As `Run.samples`.
     """
     pandas = optional('pandas', 'A DataFrame')
-    samples = run.samples(**_with_time(chosen))
-    frame = pandas.DataFrame(samples.columns).set_index(_TIME)
+    frame = pandas.DataFrame(samples.columns).set_index(TIME)
     frame.attrs = _facts(samples)
     return frame
 
 
-def to_xarray(run: Run, **chosen: Any) -> Any:
-    """The samples as a Dataset over simulated time, s; otherwise as `to_pandas`.
+def to_xarray(samples: Samples) -> Any:
+    """Samples, with their time, as a Dataset over simulated time, s; otherwise as `to_pandas`.
 
     Raises:
         MissingPackageError: If xarray is not installed.
-        RunReadError: As `Run.samples`.
     """
     xarray = optional('xarray', 'A Dataset')
-    samples = run.samples(**_with_time(chosen))
     signals = {
-        name: (_TIME, values, {'units': UNITS.get(name, '')})
+        name: (TIME, values, {'units': UNITS.get(name, '')})
         for name, values in samples.columns.items()
-        if name != _TIME
+        if name != TIME
     }
-    time = (_TIME, samples.columns[_TIME], {'units': UNITS[_TIME]})
-    return xarray.Dataset(signals, coords={_TIME: time}, attrs=_facts(samples))
-
-
-def _with_time(chosen: Mapping[str, Any]) -> dict[str, Any]:
-    columns: Iterable[str] | None = chosen.get('columns')
-    return {**chosen, 'columns': None if columns is None else [_TIME, *columns]}
+    time = (TIME, samples.columns[TIME], {'units': UNITS[TIME]})
+    return xarray.Dataset(signals, coords={TIME: time}, attrs=_facts(samples))
 
 
 def _facts(samples: Samples) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,13 +20,13 @@ from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.dataframes import UNITS, optional
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run, RunReadError
-from lathe_chatter.recording.sample_series import Seams, at
+from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.samples.codec import encode_number
+from lathe_chatter.samples.continuity import Continuity, time_text
 
 NUMBER_TYPE = 'std_msgs/msg/Float64'
-_TIME = 'time'
-_NUMBER = struct.Struct('<4sd')
-_ENCAPSULATION = b'\x00\x01\x00\x00'
 _COMMIT_AFTER = 100_000
 """Messages after which an unrolled file is put on disk."""
 
@@ -49,28 +48,12 @@ class Exported(NamedTuple):
     Attributes:
         path: The file or folder.
         samples: How many.
-        seams: Where they do not follow each other.
+        continuity: Where they do not follow each other.
     """
 
     path: Path
     samples: int
-    seams: Seams
-
-
-class Selection(NamedTuple):
-    """Which samples of a run.
-
-    Attributes:
-        topic: Of the samples; None where the run has one lathe.
-        columns: Names; None for all. The time is always among them.
-        start: Simulated time of the first, s.
-        end: Simulated time of the last, s.
-    """
-
-    topic: str | None = None
-    columns: tuple[str, ...] | None = None
-    start: float = -np.inf
-    end: float = np.inf
+    continuity: Continuity
 
 
 def to_csv(
@@ -88,7 +71,7 @@ def to_csv(
         stream.write(','.join(parts.names) + '\n')
         for part in parts:
             stream.writelines(','.join(map(repr, row)) + '\n' for row in part.tolist())
-    return Exported(path, parts.count, parts.seams)
+    return Exported(path, parts.count, parts.continuity)
 
 
 def to_parquet(
@@ -116,10 +99,10 @@ def to_parquet(
         for part in parts:
             arrays = [np.ascontiguousarray(column) for column in part.T]
             writer.write_table(arrow.table(arrays, schema=schema))
-        seams = {'gaps': parts.seams.gaps, 'restarts': parts.seams.restarts}
-        told = {name: json.dumps(value) for name, value in seams.items()}
+        broken = {'gaps': parts.continuity.gap_places, 'restarts': parts.continuity.restart_places}
+        told = {name: json.dumps(value) for name, value in broken.items()}
         writer.add_key_value_metadata({**told, 'run': str(run.path)})
-    return Exported(path, parts.count, parts.seams)
+    return Exported(path, parts.count, parts.continuity)
 
 
 def unroll(
@@ -140,10 +123,10 @@ def unroll(
     topic = chosen.topic or run.samples_topic()
     written, base, last = 0, 0, 0
     with atomic_folder(path), RunWriter(path) as writer:
-        topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != _TIME}
+        topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != TIME}
         for name in topics.values():
             writer.add_topic(topic_of_type(name, NUMBER_TYPE))
-        time = parts.names.index(_TIME)
+        time = parts.names.index(TIME)
         for part in parts:
             for number, row in enumerate(part.tolist(), parts.count - len(part) + 1):
                 stamp = base + round(row[time] * 1e9)
@@ -152,13 +135,13 @@ def unroll(
                     stamp += last
                 last = stamp
                 for k, name in topics.items():
-                    data = _NUMBER.pack(_ENCAPSULATION, row[k])
+                    data = encode_number(row[k])
                     writer.write(name, data, log_time=stamp, publish_time=stamp, sequence=number)
                 written += len(topics)
             if written > _COMMIT_AFTER:
                 writer.commit_soon()
                 written = 0
-    return Exported(path, parts.count, parts.seams)
+    return Exported(path, parts.count, parts.continuity)
 
 
 class _Parts:
@@ -167,19 +150,19 @@ class _Parts:
     Attributes:
         names: Of the columns, in the order of the record.
         count: Samples so far.
-        seams: Where they do not follow each other, so far.
+        continuity: Where they do not follow each other, so far.
     """
 
     def __init__(self, run: Run, chosen: Selection, progress: Progress | None) -> None:
         if not chosen.start <= chosen.end:
             raise ParameterError('start', chosen.start, 's', f'at most the end, {chosen.end:g} s')
         self._run, self._chosen, self._progress = run, chosen, progress
-        self.count, self.seams = 0, Seams()
+        self.count, self.continuity = 0, Continuity(remember=True)
         first = next(iter(run.sample_blocks(chosen.topic)), None)
         if first is None:
             topic = chosen.topic or run.samples_topic()
             raise run.without_samples(topic)
-        wanted = first.columns if chosen.columns is None else (_TIME, *chosen.columns)
+        wanted = first.columns if chosen.columns is None else (TIME, *chosen.columns)
         missing = sorted(set(wanted) - set(first.columns))
         if missing:
             raise RunReadError(f'The samples of {run.path} have no column {", ".join(missing)}.')
@@ -187,23 +170,21 @@ class _Parts:
 
     def __iter__(self) -> Iterator[Array]:
         """Samples (n, k)."""
-        for blocks in self._run.sample_blocks(self._chosen.topic):
-            places = [blocks.columns.index(name) for name in self.names]
-            part = blocks.samples[:, places]
-            time = part[:, self.names.index(_TIME)]
-            if len(time) and (self._chosen.start > time.min() or self._chosen.end < time.max()):
-                inside = (time >= self._chosen.start) & (time <= self._chosen.end)
-                part, time = part[inside], time[inside]
-            if len(time):
-                self.seams.follow(time)
-                self.count += len(part)
-                yield part
+        for blocks in self._run.sample_blocks(self._chosen.topic, self.names):
+            inside = self._chosen.inside(blocks.times)
+            signals = blocks.signals if inside is None else blocks.signals[:, inside]
+            if signals.shape[1]:
+                self.continuity.follow(signals[self.names.index(TIME)])
+                self.count += signals.shape[1]
+                yield signals.T
             if self._progress is not None:
-                self._progress(len(blocks.samples))
+                self._progress(len(blocks.times))
         if self.count == 0:
             start, end = self._chosen.start, self._chosen.end
-            until = f'to {at(end)}' if math.isfinite(end) else 'on'
-            raise RunReadError(f'{self._run.path} holds no samples from {at(start)} {until}.')
+            until = f'to {time_text(end)}' if math.isfinite(end) else 'on'
+            raise RunReadError(
+                f'{self._run.path} holds no samples from {time_text(start)} {until}.'
+            )
 
 
 @contextmanager
@@ -218,9 +199,9 @@ def _whole(path: Path) -> Iterator[None]:
         raise
 
 
-def seam_sentences(exported: Exported) -> Iterable[str]:
+def discontinuity_sentences(exported: Exported) -> Iterable[str]:
     """What is to be known of samples that do not follow each other."""
-    for before, after in exported.seams.gaps:
-        yield f'samples are missing between {at(before)} and {at(after)}.'
-    for before, after in exported.seams.restarts:
-        yield f'simulated time goes back from {at(before)} to {at(after)}.'
+    for before, after in exported.continuity.gap_places:
+        yield f'samples are missing between {time_text(before)} and {time_text(after)}.'
+    for before, after in exported.continuity.restart_places:
+        yield f'simulated time goes back from {time_text(before)} to {time_text(after)}.'

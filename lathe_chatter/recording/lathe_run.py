@@ -15,13 +15,12 @@ from lathe_chatter.recording.ros_messages import (
     log_bytes,
     message_bytes,
     parameters_bytes,
-    samples_bytes,
     topic_of_type,
 )
 from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.writer import RunWriter
-from lathe_chatter.samples.codec import SAMPLES_TYPE
+from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""
@@ -87,7 +86,7 @@ class LatheRun:
         """
         if self._simulated:
             self._now = self._begun + round(float(samples[-1, 0]) * _SECOND)
-        self._add(self._samples, samples_bytes(samples))
+        self._add(self._samples, encode_block(samples))
         if time.monotonic() - self._committed > _COMMIT_PERIOD:
             self.commit()
 

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
-from lathe_chatter.recording.crc import crc32
 from lathe_chatter.recording.mcap_summary import ChunkPlace
 
 _HEAD = struct.Struct('<BQ')

@@ -9,12 +9,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from isal.isal_zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
-
-from lathe_chatter.recording.crc import crc32
 
 _FOOTER = struct.Struct('<BQQQI')
 _DATA_END = struct.Struct('<BQI')
@@ -22,6 +21,8 @@ _AT_ONCE = 1 << 22
 _HEAD = struct.Struct('<BQ')
 _CHUNK_INDEX = struct.Struct('<16xQQI')
 _CHANNEL_OFFSET = struct.Struct('<HQ')
+_INDEX_HEAD = 15
+"""Bytes of a message index before its entries, which have 16 each."""
 _WANTED = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 
 
@@ -42,15 +43,14 @@ class ChunkPlace(NamedTuple):
     index_length: int
     indexes: bytes
 
-    def index_of(self, channel: int) -> tuple[int, int] | None:
-        """Where the message index of a channel begins and ends; None where it has none."""
-        ends = self.offset + self.length + self.index_length
+    def index_size(self, channel: int) -> int:
+        """Bytes that the entries of a channel in its message index have; -1 if it is not told."""
         places = [*_CHANNEL_OFFSET.iter_unpack(self.indexes)]
-        begins = sorted([offset for _, offset in places] + [ends])
-        for number, offset in places:
-            if number == channel:
-                return offset, begins[begins.index(offset) + 1]
-        return None
+        end = self.offset + self.length + self.index_length
+        begin = next((offset for number, offset in places if number == channel), end)
+        after = min((offset for _, offset in places if offset > begin), default=end)
+        size = after - begin - _INDEX_HEAD if after > begin else 0
+        return -1 if not places or size % 16 else size
 
 
 @dataclass

@@ -25,6 +25,7 @@ from pathlib import Path
 
 import lz4.frame
 import numpy as np
+from isal.isal_zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -42,7 +43,6 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from lathe_chatter.recording.crc import crc32
 from lathe_chatter.recording.disk_thread import FileSync
 from lathe_chatter.recording.provenance import sealed
 

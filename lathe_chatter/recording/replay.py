@@ -13,8 +13,8 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.cut_events import Change, Knock
 from lathe_chatter.recording.cut_log import CutLog
+from lathe_chatter.recording.sample_reader import SampleBlocks
 from lathe_chatter.samples import SAMPLE_COLUMNS
-from lathe_chatter.samples.codec import Blocks
 
 _MAX_SAMPLES = 50_000
 """Samples that are computed at once where the record has none."""
@@ -92,7 +92,7 @@ class Replay:
         self.has_beginning = bool(session.beginning)
         self._waiting = list(session.events)
 
-    def compare(self, blocks: Blocks) -> Difference | None:
+    def compare(self, blocks: SampleBlocks) -> Difference | None:
         """Compare the blocks of some messages with what the lathe does; the first difference.
 
         Raises:
@@ -108,7 +108,7 @@ class Replay:
             self.after_gap = False
         return None
 
-    def _stretches(self, blocks: Blocks) -> Iterator[Array]:
+    def _stretches(self, blocks: SampleBlocks) -> Iterator[Array]:
         """Messages joined as far as their places follow each other; the lathe is at the first."""
         ends = np.cumsum(blocks.rows)
         begins = ends - blocks.rows
@@ -174,7 +174,7 @@ class Replay:
             self._lathe.retune(self._lathe.cut.with_changes(**event.new))
 
 
-def _places(blocks: Blocks, sample_rate: float) -> Integers:
+def _places(blocks: SampleBlocks, sample_rate: float) -> Integers:
     """The number of the first sample of each message, by the times of all of its samples.
 
     One altered time among them does not lead astray.

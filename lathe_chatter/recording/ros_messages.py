@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from lathe_chatter.arrays import Array
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.samples import SAMPLE_COLUMNS
-from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 LOG_TYPE = 'rcl_interfaces/msg/Log'
 PARAMETER_EVENT_TYPE = 'rcl_interfaces/msg/ParameterEvent'
@@ -40,28 +37,6 @@ def topic_of_type(name: str, kind: str) -> Topic:
 def message_bytes(kind: str, **fields: Any) -> bytes:
     """A message of a type, serialised."""
     return bytes(types().serialize_cdr(types().types[kind](**fields), kind))
-
-
-def samples_bytes(samples: Array, columns: tuple[str, ...] = SAMPLE_COLUMNS) -> bytes:
-    """A block of samples (n, k), as the lathe publishes it."""
-    return _samples_head(len(samples), columns) + samples.astype('<f8', copy=False).tobytes()
-
-
-@cache
-def _samples_head(rows: int, columns: tuple[str, ...]) -> bytes:
-    """What stands before the numbers of a block."""
-    width = len(columns)
-    known = types().types
-    dim = known['std_msgs/msg/MultiArrayDimension']
-    layout = known['std_msgs/msg/MultiArrayLayout'](
-        dim=[
-            dim(label='sample', size=rows, stride=rows * width),
-            dim(label=','.join(columns), size=width, stride=width),
-        ],
-        data_offset=0,
-    )
-    whole = message_bytes(SAMPLES_TYPE, layout=layout, data=np.zeros(rows * width))
-    return whole[: len(whole) - 8 * rows * width]
 
 
 def log_bytes(name: str, sentence: str, stamp: int) -> bytes:

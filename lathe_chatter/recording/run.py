@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,22 +13,17 @@ from mcap.writer import MCAP0_MAGIC
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.recording.bag_folder import RunFolder, RunReadError, run_folder
-from lathe_chatter.recording.chunk_messages import Messages, joined_messages
 from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.mcap_reader import Damage
 from lathe_chatter.recording.raw_messages import Raw, Recorded, raw_of
 from lathe_chatter.recording.run_file import Contents, Note, RecordedFile
-from lathe_chatter.recording.sample_columns import Cut, cut_of
-from lathe_chatter.recording.sample_selection import chosen_columns, chosen_range
-from lathe_chatter.recording.sample_series import Samples, joined
-from lathe_chatter.recording.sample_threads import cuts_by_index
-from lathe_chatter.samples.codec import SAMPLES_TYPE, Blocks, blocks_of
+from lathe_chatter.recording.sample_reader import TIME, SampleBlocks, sample_blocks
+from lathe_chatter.recording.sample_series import Samples, joined, selection
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 
 _REST = 'What is left of it can be saved by `lathe-chatter recover`.'
-_CHUNKS_AT_ONCE = 16
-"""Arrays of a single chunk are so small that calls would cost more than their work."""
 
 
 @dataclass(frozen=True)
@@ -122,16 +117,23 @@ class Run:
             message = store.deserialize_cdr(raw.data, raw.type)
             yield Recorded(raw.topic, raw.log_time, raw.sequence, message, raw.publish_time)
 
-    def sample_blocks(self, topic: str | None = None) -> Iterator[Blocks]:
+    def sample_blocks(
+        self, topic: str | None = None, columns: Iterable[str] | None = None
+    ) -> Iterator[SampleBlocks]:
         """The samples of a lathe as they were recorded, some 4 s at a time.
+
+        Args:
+            topic: Of the samples; may be left out where the run has one lathe.
+            columns: Which signals besides the time; all by default.
 
         Raises:
             RunReadError: If a file is damaged, or there are several lathes and no topic is named.
             LayoutError: If a message is no block of samples.
         """
         name = topic or self.samples_topic()
+        wanted = None if columns is None else tuple(columns)
         for file in self._opened():
-            yield from _blocks(file, name)
+            yield from sample_blocks(file, name, wanted)
 
     def samples(
         self,
@@ -156,16 +158,15 @@ class Run:
             LayoutError: If a message is no block of samples.
         """
         name = topic or self.samples_topic()
-        wanted = chosen_columns(columns)
-        start, end = chosen_range(start, end)
-        files = [*self._opened()]
-        expected = sum(file.count(name) for file in files)
-        found = joined(_cuts(files, name, wanted), expected, start, end)
+        wanted = selection(name, columns, start, end)
+        expected = sum(file.count(name) for file in self._opened())
+        found = joined(self.sample_blocks(name, wanted.columns), expected, wanted)
         if found is None:
             raise self.without_samples(name)
-        if wanted is not None and set(wanted) - set(found.columns):
-            missing = ', '.join(sorted(set(wanted) - set(found.columns)))
-            raise RunReadError(f'The samples of {name} in {self.path} have no column {missing}.')
+        missing = sorted(set(wanted.columns or ()) - set(found.columns))
+        if missing:
+            names = ', '.join(missing)
+            raise RunReadError(f'The samples of {name} in {self.path} have no column {names}.')
         return found
 
     def without_samples(self, topic: str) -> RunReadError:
@@ -183,7 +184,7 @@ class Run:
         return None if first is None else blocks * int(first.rows[0])
 
     def to_pandas(self, **chosen: Any) -> Any:
-        """The samples as a pandas DataFrame by simulated time; see `frames.to_pandas`.
+        """The samples as a pandas DataFrame by simulated time; see `dataframes.to_pandas`.
 
         Args:
             chosen: Topic, columns, start and end, as for `samples`.
@@ -192,10 +193,10 @@ class Run:
             MissingPackageError: If pandas is not installed.
             RunReadError: As `samples`.
         """
-        return to_pandas(self, **chosen)
+        return to_pandas(self._with_time(chosen))
 
     def to_xarray(self, **chosen: Any) -> Any:
-        """The samples as an xarray Dataset over simulated time; see `frames.to_xarray`.
+        """The samples as an xarray Dataset over simulated time; see `dataframes.to_xarray`.
 
         Args:
             chosen: Topic, columns, start and end, as for `samples`.
@@ -204,7 +205,11 @@ class Run:
             MissingPackageError: If xarray is not installed.
             RunReadError: As `samples`.
         """
-        return to_xarray(self, **chosen)
+        return to_xarray(self._with_time(chosen))
+
+    def _with_time(self, chosen: Mapping[str, Any]) -> Samples:
+        columns: Iterable[str] | None = chosen.get('columns')
+        return self.samples(**{**chosen, 'columns': columns and [TIME, *columns]})
 
     def samples_topic(self) -> str:
         """The topic of the samples, where the run has one lathe.
@@ -241,30 +246,6 @@ class Run:
                 if schema.name == kind:
                     return str(schema.data.decode())
         raise RunReadError(f'{self.path} does not say what a {kind} is.')
-
-
-def _cuts(
-    files: Iterable[RecordedFile], topic: str, wanted: tuple[str, ...] | None
-) -> Iterator[Cut]:
-    """Columns of the samples of a topic, by the quickest way that each file allows."""
-    for file in files:
-        cuts = cuts_by_index(file, topic, wanted)
-        if cuts is None:
-            cuts = (cut_of(blocks, wanted) for blocks in _blocks(file, topic))
-        yield from cuts
-
-
-def _blocks(file: RecordedFile, topic: str) -> Iterator[Blocks]:
-    """The samples of a topic in a file, some 4 s at a time."""
-    waiting: list[Messages] = []
-    for contents in file.contents():
-        numbers = [n for n, channel in file.known.channels.items() if channel.topic == topic]
-        waiting += [contents.messages.of(number) for number in numbers]
-        if len(waiting) >= _CHUNKS_AT_ONCE:
-            yield from blocks_of(joined_messages(waiting))
-            waiting.clear()
-    if waiting:
-        yield from blocks_of(joined_messages(waiting))
 
 
 def _begins_as_mcap(path: Path) -> bool:

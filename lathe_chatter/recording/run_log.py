@@ -16,9 +16,8 @@ import numpy as np
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.cut_log import CutLog, logger_of
 from lathe_chatter.recording.ros_messages import LOG_TYPE, types
-from lathe_chatter.recording.sample_series import missing_in
-from lathe_chatter.samples.codec import SAMPLES_TYPE, Layout, layout_of
-from lathe_chatter.samples.continuity import Continuity, Joint
+from lathe_chatter.samples.codec import SAMPLES_TYPE, SampleDecoder
+from lathe_chatter.samples.continuity import BlockOrder, Continuity, missing_in
 
 FLAG_TYPE = 'std_msgs/msg/Bool'
 _FLAG_BYTE = 4
@@ -37,13 +36,13 @@ class Discontinuity(NamedTuple):
     """Where samples do not simply follow those before.
 
     Attributes:
-        joint: What is there instead.
+        order: What is there instead.
         before: Simulated time of the last sample before, s; None before the first.
         after: Of the first after it, s.
         missing: How many samples of the lathe are missing there.
     """
 
-    joint: Joint
+    order: BlockOrder
     before: float | None
     after: float
     missing: int
@@ -73,8 +72,7 @@ class SamplesReceived:
     discontinuities: deque[Discontinuity] = field(
         default_factory=lambda: deque(maxlen=_MAX_DISCONTINUITIES)
     )
-    _layout: Layout | None = None
-    _beginning: bytes = b''
+    _decoder: SampleDecoder = field(default_factory=SampleDecoder)
     _published: int = 0
     _usual: float = 0.0
     _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_MAX_BLOCKS))
@@ -99,16 +97,16 @@ class SamplesReceived:
     def _join(self, times: Any) -> None:
         """Join a block by its times (n,), s."""
         before, lost = self.continuity.last, self.continuity.lost
-        joint = self.continuity.join(times)
-        if joint is Joint.CONTIGUOUS:
+        order = self.continuity.join(times)
+        if order is BlockOrder.CONTIGUOUS:
             return
         first, missing = float(times[0]), self.continuity.lost - lost
-        if joint is not Joint.GAP:
+        if order is not BlockOrder.GAP:
             step = (float(times[-1]) - first) / (len(times) - 1) if len(times) > 1 else first
             missing = max(missing_in((0.0, first), step), 0) if step > 0.0 else 0
-        if joint is Joint.FIRST:
+        if order is BlockOrder.FIRST:
             self.first, self.head = first, missing
-        self.discontinuities.append(Discontinuity(joint, before, first, missing))
+        self.discontinuities.append(Discontinuity(order, before, first, missing))
 
     def time_at(self, log_time: int) -> float:
         """Simulated time when another message was received, s: that of the block about then."""
@@ -116,18 +114,10 @@ class SamplesReceived:
         return self._came[min(place, len(self._came) - 1)][1] if self._came else 0.0
 
     def _times(self, data: bytes) -> Any:
-        layout = self._layout
-        if layout is None or not data.startswith(self._beginning):
-            layout = self._layout = layout_of(data)
-            self._beginning = data[: layout.start]
-            if 'time' not in layout.columns:
-                self._layout = None
-                raise LayoutError('The samples have no column time.')
-        width = len(layout.columns)
-        if len(data) < layout.start + layout.size:
-            raise LayoutError('A message of samples is cut off or no Float64MultiArray.')
-        numbers = np.frombuffer(data, '<f8', layout.rows * width, layout.start)
-        return numbers[layout.columns.index('time') :: width]
+        samples, columns = self._decoder.decode(data)
+        if 'time' not in columns:
+            raise LayoutError('The samples have no column time.')
+        return samples[:, columns.index('time')]
 
     def _follow(self, publish_time: int) -> None:
         """Notice silences, by the clock of who publishes."""

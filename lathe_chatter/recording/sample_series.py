@@ -1,23 +1,64 @@
-"""Blocks of samples joined into signals, with what is missing between them."""
+"""The samples of a run as signals: which are wanted, joined, with what is missing between them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Sequence
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.recording.sample_columns import Cut
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.recording.sample_reader import SampleBlocks
+from lathe_chatter.samples.continuity import Continuity
 
-_LARGER_THAN_STEP = 1.5
-"""A step of time between two samples so many times the usual one is a gap."""
+
+class Selection(NamedTuple):
+    """Which samples of a run.
+
+    Attributes:
+        topic: Of the samples; None where the run has one lathe.
+        columns: Names; None for all.
+        start: Simulated time of the first, s.
+        end: Simulated time of the last, s.
+    """
+
+    topic: str | None = None
+    columns: tuple[str, ...] | None = None
+    start: float = -np.inf
+    end: float = np.inf
+
+    def inside(self, times: Array) -> NDArray[np.bool_] | None:
+        """Which of some times (n,) are wanted; None if all are."""
+        if (self.start, self.end) == (-np.inf, np.inf) or not times.size:
+            return None
+        if self.start <= times.min() and times.max() <= self.end:
+            return None
+        inside: NDArray[np.bool_] = (times >= self.start) & (times <= self.end)
+        return inside
 
 
-_COUNTABLE = 1e12
-"""Of samples and seconds: more are no count and no time, but a damaged number."""
-_ALL = (-np.inf, np.inf)
+def selection(topic: str | None, columns: object, start: object, end: object) -> Selection:
+    """What a caller asks for, checked before anything is read.
+
+    Raises:
+        ParameterError: If columns are no list of names, an end is no number, or the range empty.
+    """
+    names: tuple[str, ...] | None = None
+    if columns is not None:
+        names = tuple(columns) if isinstance(columns, Iterable) else ()
+        if isinstance(columns, str) or not names or not all(isinstance(n, str) for n in names):
+            raise ParameterError('columns', columns, '', 'a list of names of columns')
+    for name, value in (('start', start), ('end', end)):
+        if not isinstance(value, Real) or isinstance(value, bool) or math.isnan(value):
+            raise ParameterError(name, value, 's', 'a number')
+    first, last = float(start), float(end)  # type: ignore[arg-type]  # checked above
+    if first > last:
+        raise ParameterError('start', first, 's', f'at most the end, {last:g} s')
+    return Selection(topic, names, first, last)
 
 
 class Samples(NamedTuple):
@@ -49,102 +90,46 @@ class Samples(NamedTuple):
         return found
 
 
-class Seams:
-    """Finds where samples do not follow each other.
-
-    Attributes:
-        gaps: Simulated times before and after what is missing, s.
-        restarts: Simulated times before and after simulated time went back, s.
-        lost: How many samples are missing in the gaps.
-        step: The usual time between two samples, s; 0 while unknown.
-    """
-
-    def __init__(self) -> None:
-        """Begin before the first sample."""
-        self.gaps: list[tuple[float, float]] = []
-        self.restarts: list[tuple[float, float]] = []
-        self.lost = 0
-        self.step = 0.0
-        self._last: Array = np.zeros(0)
-
-    def follow(self, times: Array) -> None:
-        """Go on with the times of more samples (n,), s."""
-        joined = np.concatenate((self._last, times)) if len(self._last) else times
-        self._last = joined[-1:].copy()
-        steps = joined[1:] - joined[:-1]
-        if not len(steps):
-            return
-        if self.step == 0.0:
-            told = steps[np.isfinite(steps)]
-            self.step = max(float(np.median(told)), 0.0) if len(told) else 0.0
-        if steps.min() > 0.0 and steps.max() <= _LARGER_THAN_STEP * self.step:
-            return
-        # So that a time which is no number is a seam too.
-        forward = steps > 0.0
-        longest = _LARGER_THAN_STEP * self.step if self.step else np.inf
-        for place in np.flatnonzero(~(forward & (steps <= longest))):
-            seam = float(joined[place]), float(joined[place + 1])
-            if not forward[place]:
-                self.restarts.append(seam)
-            else:
-                self.gaps.append(seam)
-                self.lost += missing_in(seam, self.step)
-
-
-def missing_in(gap: tuple[float, float], step: float) -> int:
-    """How many samples are missing in a gap, by its ends and the usual step, s; 0 if unknown."""
-    count = (gap[1] - gap[0]) / step if step else np.inf
-    return round(count) - 1 if count < _COUNTABLE else 0
-
-
-def at(time: float) -> str:
-    """A simulated time for people, s."""
-    return f'{time:.6f} s' if abs(time) < _COUNTABLE else f'{time!r} s'
-
-
-def joined(cuts: Iterator[Cut], expected: int, start: float, end: float) -> Samples | None:
-    """All samples within a range of simulated time.
+def joined(blocks: Iterable[SampleBlocks], expected: int, wanted: Selection) -> Samples | None:
+    """All samples that are wanted; None where there is not one at all.
 
     Args:
-        cuts: In order.
-        expected: How many blocks there are, as far as is known.
-        start: Of the range, s.
-        end: Of the range, s.
-
-    Returns:
-        The samples. None where there is not one.
+        blocks: In order.
+        expected: How many messages there are, as far as is known.
+        wanted: Columns and range.
     """
     signals: _Signals | None = None
     log_times: list[Integers] = []
     ends: list[Array] = []
-    seams = Seams()
-    for cut in cuts:
-        if not len(cut.times):
+    continuity = Continuity(remember=True)
+    for part in blocks:
+        if not len(part.times):
             continue
+        names = part.columns if wanted.columns is None else wanted.columns
         if signals is None:
-            signals = _Signals(cut.columns, expected * int(cut.rows[0]))
-        time, part = cut.times, cut.signals
-        last = time[np.cumsum(cut.rows) - 1]
-        if (start, end) != _ALL and (start > time.min() or end < time.max()):
-            inside = (time >= start) & (time <= end)
-            part, time = part[:, inside], time[inside]
-            kept = (last >= start) & (last - (cut.rows - 1) * seams.step <= end)
-            log_times.append(cut.log_times[kept])
-            ends.append(last[kept])
-        else:
-            log_times.append(cut.log_times.copy())
-            ends.append(last)
-        if len(time):
-            seams.follow(time)
-            signals.append(cut.columns, part)
+            names = tuple(name for name in part.columns if name in names)
+            signals = _Signals(names, expected * int(part.rows[0]))
+        times, chosen = part.times, part.signals
+        last = times[np.maximum(np.cumsum(part.rows) - 1, 0)]
+        log = part.log_times
+        inside = wanted.inside(times)
+        if inside is not None:
+            chosen, times = chosen[:, inside], times[inside]
+            first = last - (part.rows - 1) * continuity.step
+            kept = (last >= wanted.start) & (first <= wanted.end)
+            last, log = last[kept], log[kept]
+        log_times.append(log)
+        ends.append(last)
+        continuity.follow(times)
+        signals.append(part.columns, chosen)
     if signals is None:
         return None
     return Samples(
         signals.taken(),
         np.concatenate(log_times),
         np.concatenate(ends),
-        seams.gaps,
-        seams.restarts,
+        [*continuity.gap_places],
+        [*continuity.restart_places],
     )
 
 

@@ -20,10 +20,10 @@ from lathe_chatter.recording.completeness import (
 from lathe_chatter.recording.provenance import PUBLISHERS, RECEPTION, STALLS
 from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.run_file import Note, RecordedFile, offers_of
-from lathe_chatter.recording.sample_series import Seams, at, missing_in
 from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification import Finding, SampleCount, Verification
 from lathe_chatter.samples.codec import SAMPLES_TYPE
+from lathe_chatter.samples.continuity import Continuity, missing_in, time_text
 
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']
 
@@ -107,16 +107,16 @@ def _check_samples(found: Verification, progress: Progress) -> None:
     for topic, kind in sorted(found.run.topics.items()):
         if kind != SAMPLES_TYPE or not topic.endswith('/samples'):
             continue
-        seams = Seams()
+        continuity = Continuity(remember=True)
         count, first, last, strange = 0, math.nan, math.nan, 0
         try:
-            for block in found.run.sample_blocks(topic):
+            for block in found.run.sample_blocks(topic, columns=()):
                 progress(len(block.rows))
-                times = block.samples[:, block.columns.index('time')]
+                times = block.times
                 if not len(times):
                     continue
                 strange += int(np.count_nonzero(~np.isfinite(times)))
-                seams.follow(times)
+                continuity.follow(times)
                 first = float(times[0]) if not count else first
                 last = float(times[-1])
                 count += len(times)
@@ -125,21 +125,21 @@ def _check_samples(found: Verification, progress: Progress) -> None:
         found.samples[topic] = SampleCount(count, first, last)
         if strange:
             found.lose(f'{topic}: the times of {strange} samples are no numbers.')
-        late = missing_in((0.0, first), seams.step) if count and seams.step else 0
+        late = missing_in((0.0, first), continuity.step) if count and continuity.step else 0
         if late > 0:
             found.remark(
-                f'{topic}: the record begins at {at(first)} of simulated time, {late} samples '
-                'late.'
+                f'{topic}: the record begins at {time_text(first)} of simulated time, '
+                f'{late} samples late.'
             )
-        for gap in seams.gaps:
+        for gap in continuity.gap_places:
             found.lose(
-                f'{topic}: {missing_in(gap, seams.step) or "some"} samples are missing between '
-                f'{at(gap[0])} and {at(gap[1])} of simulated time.'
+                f'{topic}: {missing_in(gap, continuity.step) or "some"} samples are missing '
+                f'between {time_text(gap[0])} and {time_text(gap[1])} of simulated time.'
             )
-        for before, after in seams.restarts:
+        for before, after in continuity.restart_places:
             found.remark(
-                f'{topic}: simulated time goes back from {at(before)} to {at(after)}: the lathe '
-                'was reset or started again.'
+                f'{topic}: simulated time goes back from {time_text(before)} to '
+                f'{time_text(after)}: the lathe was reset or started again.'
             )
 
 

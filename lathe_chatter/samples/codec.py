@@ -1,141 +1,155 @@
-"""Blocks of samples straight from serialised messages (std_msgs/Float64MultiArray, CDR)."""
+"""A block of samples as the bytes of a message, std_msgs/Float64MultiArray in CDR, and back.
+
+Row-major: `dim[0]` counts the samples, `dim[1]` has the names of the columns as its label, joined
+by commas. Nothing before the numbers changes from block to block of one lathe: it is made, or
+understood, once: to have a message of ROS made and serialised costs as much as several ticks.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.recording.chunk_messages import Messages
+from lathe_chatter.samples.columns import SAMPLE_COLUMNS
 
 SAMPLES_TYPE = 'std_msgs/msg/Float64MultiArray'
-_LITTLE_ENDIAN = b'\x00\x01'
-_ENCAPSULATION = 4
+ENCAPSULATION = b'\x00\x01\x00\x00'
+"""What CDR begins with, little-endian."""
+_BYTE_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 _DIMENSIONS = 2
+_CUT_OFF = 'A message of samples is cut off or no Float64MultiArray.'
 
 
-class Layout(NamedTuple):
+class BlockLayout(NamedTuple):
     """Where the numbers of a serialised block of samples are.
 
     Attributes:
         columns: Their names.
         rows: How many samples.
         start: Byte of the first number.
+        order: Of the bytes of a number, '<' or '>'.
     """
 
     columns: tuple[str, ...]
     rows: int
     start: int
+    order: str = '<'
 
     @property
     def size(self) -> int:
         """Bytes of the numbers."""
         return 8 * self.rows * len(self.columns)
 
-
-class Blocks(NamedTuple):
-    """Blocks of samples that follow each other.
-
-    Attributes:
-        columns: Names.
-        samples: Of all blocks (n, k).
-        rows: Samples in each block (blocks,).
-        log_times: When each was received, ns (blocks,).
-        publish_times: When each was published, ns (blocks,).
-    """
-
-    columns: tuple[str, ...]
-    samples: Array
-    rows: Integers
-    log_times: Integers
-    publish_times: Integers
+    def numbers(self, data: bytes) -> Array:
+        """The samples (n, k) of a block with this layout, read-only where nothing is converted."""
+        count = self.rows * len(self.columns)
+        found = np.frombuffer(data, f'{self.order}f8', count, self.start)
+        numbers: Array = found.astype(float, copy=False)
+        return numbers.reshape(self.rows, -1) if count else numbers.reshape(0, len(self.columns))
 
 
-def layout_of(data: bytes) -> Layout:
+def block_layout(data: bytes) -> BlockLayout:
     """The layout of a serialised block.
 
     Raises:
         LayoutError: If it is no block of samples as the contract has them.
     """
     try:
-        return _layout_of(data)
+        return _block_layout(data)
     except (struct.error, UnicodeDecodeError):
-        raise LayoutError('A message of samples is cut off or no Float64MultiArray.') from None
+        raise LayoutError(_CUT_OFF) from None
 
 
-def _layout_of(data: bytes) -> Layout:
-    if data[:2] != _LITTLE_ENDIAN:
-        raise LayoutError('A message of samples is not little-endian CDR.')
-    body = memoryview(data)[_ENCAPSULATION:]
-    (dimensions,) = struct.unpack_from('<I', body)
+def _block_layout(data: bytes) -> BlockLayout:
+    order = _BYTE_ORDERS.get(bytes(data[:2]))
+    if order is None:
+        raise LayoutError('A message of samples is not CDR.')
+    body = memoryview(data)[len(ENCAPSULATION) :]  # CDR aligns from here
+    words = struct.Struct(f'{order}II')
+    (dimensions,) = struct.unpack_from(f'{order}I', body)
     if dimensions != _DIMENSIONS:
-        raise LayoutError(f'A message of samples has {dimensions} dimensions and not 2.')
+        raise LayoutError(f'A block of samples has 2 dimensions, not {dimensions}.')
     place = 4
-    names: list[str] = []
-    sizes: list[int] = []
+    labels: list[str] = []
+    shape: list[tuple[int, int]] = []  # size and stride
     for _ in range(dimensions):
-        (letters,) = struct.unpack_from('<I', body, place)
+        (letters,) = struct.unpack_from(f'{order}I', body, place)
         place += 4
         if place + letters > len(body):
-            raise LayoutError('A message of samples is cut off or no Float64MultiArray.')
-        names.append(bytes(body[place : place + letters]).rstrip(b'\x00').decode())
+            raise LayoutError(_CUT_OFF)
+        labels.append(bytes(body[place : place + letters]).rstrip(b'\x00').decode())
         place += letters + -letters % 4
-        sizes.append(struct.unpack_from('<II', body, place)[0])
-        place += 8
-    skipped, count = struct.unpack_from('<II', body, place)
-    place += 8
-    place += -place % 8
-    columns = tuple(names[1].split(','))
-    if skipped or sizes[1] != len(columns) or count != sizes[0] * sizes[1]:
-        raise LayoutError('A message of samples has other sizes than its layout says.')
+        shape.append(words.unpack_from(body, place))
+        place += words.size
+    skipped, count = words.unpack_from(body, place)
+    place += words.size
+    place += -place % 8 if count else 0
+    columns = tuple(labels[1].split(','))
+    (rows, _), (width, stride) = shape
+    if width != len(columns):
+        raise LayoutError(f'The label {labels[1]!r} does not name {width} columns.')
+    if stride != width or count != skipped + rows * width:
+        raise LayoutError(
+            f'{rows} samples of {width} columns after an offset of {skipped} '
+            f'do not make {count} numbers.'
+        )
     if place + 8 * count > len(body):
-        raise LayoutError('A message of samples is cut off or no Float64MultiArray.')
-    return Layout(columns, sizes[0], _ENCAPSULATION + place)
+        raise LayoutError(_CUT_OFF)
+    return BlockLayout(columns, rows, len(ENCAPSULATION) + place + 8 * skipped, order)
 
 
-def blocks_of(messages: Messages) -> Iterator[Blocks]:
-    """The blocks in messages of one channel: as few arrays as their layouts allow.
+def encode_block(samples: Array, columns: Sequence[str] = SAMPLE_COLUMNS) -> bytes:
+    """The message of a block of samples (n, k) with the names of its k columns.
 
     Raises:
-        LayoutError: If a message is no block of samples.
+        LayoutError: If names and columns do not match.
     """
-    begun = 0
-    while begun < len(messages.heads):
-        layout = layout_of(messages.payload(begun))
-        count = _alike(messages, begun, layout)
-        chosen = slice(begun, begun + count)
-        numbers = _cut_out(messages.records, messages.starts[chosen] + layout.start, layout.size)
-        yield Blocks(
-            layout.columns,
-            numbers.view('<f8').reshape(-1, len(layout.columns)),
-            np.full(count, layout.rows),
-            messages.heads['log_time'][chosen].astype(np.int64),
-            messages.heads['publish_time'][chosen].astype(np.int64),
-        )
-        begun += count
+    return _head(*samples.shape, tuple(columns)) + samples.astype('<f8', copy=False).tobytes()
 
 
-def _alike(messages: Messages, begun: int, layout: Layout) -> int:
-    """How many messages from one on have its size and its very head."""
-    sizes = messages.sizes[begun:]
-    other = np.flatnonzero(sizes != sizes[0])
-    count = int(other[0]) if len(other) else len(sizes)
-    starts = messages.starts[begun : begun + count]
-    heads = _cut_out(messages.records, starts, layout.start).reshape(count, -1)
-    different = np.flatnonzero((heads != heads[0]).any(axis=1))
-    return int(different[0]) if len(different) else count
+@lru_cache(maxsize=64)
+def _head(rows: int, width: int, columns: tuple[str, ...]) -> bytes:
+    """What stands before the numbers of a block."""
+    if width != len(columns):
+        raise LayoutError(f'{width} columns of samples have {len(columns)} names.')
+    body = struct.pack('<I', _DIMENSIONS)
+    for label, size, stride in (('sample', rows, rows * width), (','.join(columns), width, width)):
+        text = label.encode() + b'\0'
+        body += struct.pack('<I', len(text)) + text + bytes(-len(text) % 4)
+        body += struct.pack('<II', size, stride)
+    body += struct.pack('<II', 0, rows * width)
+    return ENCAPSULATION + body + bytes(-len(body) % 8 if rows else 0)
 
 
-def _cut_out(records: bytes, starts: Integers, size: int) -> NDArray[np.uint8]:
-    """The bytes of equal pieces that begin anywhere, joined."""
-    if size == 0:
-        return np.zeros(0, np.uint8)
-    every: NDArray[Any] = np.ndarray(
-        (len(records) - size + 1,), f'V{size}', buffer=records, strides=(1,)
-    )
-    return np.ascontiguousarray(every[starts]).view(np.uint8)
+def encode_number(value: float) -> bytes:
+    """The message of a number, std_msgs/Float64."""
+    return struct.pack('<4sd', ENCAPSULATION, value)
+
+
+class SampleDecoder:
+    """Blocks of samples from the messages of one topic, one after the other."""
+
+    def __init__(self) -> None:
+        """Begin with nothing known."""
+        self._head = b''
+        self._layout: BlockLayout | None = None
+
+    def decode(self, data: bytes) -> tuple[Array, tuple[str, ...]]:
+        """The samples (n, k) of a message, and the names of its k columns.
+
+        Raises:
+            LayoutError: If it is no block of samples.
+        """
+        layout = self._layout
+        if layout is None or not data.startswith(self._head):
+            layout = block_layout(data)
+            self._layout, self._head = layout, data[: layout.start]
+        elif len(data) < layout.start + layout.size:
+            raise LayoutError(_CUT_OFF)
+        return layout.numbers(data), layout.columns

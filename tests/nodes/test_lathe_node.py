@@ -15,7 +15,7 @@ from rclpy.qos import ReliabilityPolicy, qos_profile_parameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
-from support.node_bench import DEEP, LATCHED, Bench, messages_of
+from support.node_bench import DEEP, LATCHED, Bench, messages_of, samples_of
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.lathe import VirtualLathe
@@ -23,7 +23,6 @@ from lathe_chatter.lathe.cut_events import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.control import RunState
 from lathe_chatter.nodes.lathe_node import LatheNode
-from lathe_chatter.nodes.messages import samples_from_message
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 TICK = 20
@@ -50,7 +49,7 @@ def at_rest(bench: Bench) -> None:
 
 def blocks(messages: Sequence[Float64MultiArray], after: float = 0.0) -> Array:
     """All samples in messages, from the last start of simulated time on."""
-    samples = np.concatenate([samples_from_message(m)[0] for m in messages])
+    samples = np.concatenate([samples_of(m) for m in messages])
     restarts = np.flatnonzero(np.diff(samples[:, 0]) < 0)
     samples = samples[restarts[-1] + 1 :] if restarts.size else samples
     return samples[samples[:, 0] > after]
@@ -61,7 +60,7 @@ def taken(bench: Bench, messages: list[Any], steps: int) -> Array:
     expected = len(messages) + steps
     bench.steps('/lathe', steps)
     bench.spin_until(lambda: len(messages) >= expected, 'samples')
-    return np.concatenate([samples_from_message(m)[0] for m in messages[-steps:]])
+    return np.concatenate([samples_of(m) for m in messages[-steps:]])
 
 
 def listen(bench: Bench) -> list[Any]:

@@ -17,9 +17,9 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.lathe_node import LatheNode
-from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import encode_block
 
 BLOCK = 200
 STABLE = Cut(bearing_contact=BearingContact.NONE)
@@ -37,7 +37,7 @@ class Machine:
 
     def send(self, samples: Array) -> None:
         for k in range(0, len(samples), BLOCK):
-            self._publisher.publish(samples_to_message(samples[k : k + BLOCK]))
+            self._publisher.publish(encode_block(samples[k : k + BLOCK]))
             self._bench.executor.spin_once(timeout_sec=0.01)
 
     def cut(self, seconds: float) -> None:
@@ -167,7 +167,7 @@ def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> N
         'spindle_angle',
     )
     for k in range(0, len(samples), BLOCK):
-        publisher.publish(samples_to_message(samples[k : k + BLOCK, order], names))
+        publisher.publish(encode_block(samples[k : k + BLOCK, order], names))
         bench.executor.spin_once(timeout_sec=0.01)
     bench.spin_until(lambda: flags and flags[-1].data, 'the flag')
 
@@ -179,7 +179,7 @@ def test_a_dead_sensor_is_done_without(start: Callable[..., Any], bench: Bench) 
     samples = VirtualLathe(cut=UNSTABLE).advance(20_000)
     samples[:, SAMPLE_COLUMNS.index('workpiece_displacement')] = np.nan
     for k in range(0, len(samples), BLOCK):
-        publisher.publish(samples_to_message(samples[k : k + BLOCK]))
+        publisher.publish(encode_block(samples[k : k + BLOCK]))
         bench.executor.spin_once(timeout_sec=0.01)
     bench.spin_until(lambda: flags and flags[-1].data, 'the flag')
 
@@ -189,11 +189,11 @@ def test_a_dead_sensor_is_done_without(start: Callable[..., Any], bench: Bench) 
     [
         (Float64MultiArray(), 'A block of samples has 2 dimensions, not 0.'),
         (
-            samples_to_message(np.zeros((3, 2)), ('tool_displacement', 'tool_velocity')),
+            encode_block(np.zeros((3, 2)), ('tool_displacement', 'tool_velocity')),
             'The samples have no column time, only tool_displacement, tool_velocity.',
         ),
         (
-            samples_to_message(np.full((3, 8), np.nan)),
+            encode_block(np.full((3, 8), np.nan)),
             'The times of the samples are not finite, or do not increase.',
         ),
     ],

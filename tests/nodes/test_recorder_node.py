@@ -26,10 +26,10 @@ from lathe_chatter import __version__
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.nodes.lathe_node import LatheNode
-from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.recorder_node import RecorderNode
 from lathe_chatter.recording import read_run, verify
 from lathe_chatter.recording.run_summary import SUMMARY
+from lathe_chatter.samples.codec import encode_block
 
 Start = Callable[..., Any]
 KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -142,7 +142,7 @@ def test_a_gap_in_the_samples_is_told_by_their_own_times(
     for k in range(20):
         samples = lathe.advance(20)
         if k not in (7, 8):  # no publisher's number tells of these
-            publisher.publish(samples_to_message(samples))
+            publisher.publish(encode_block(samples))
     spin_until(lambda: recorder.messages_of('/lathe/samples') == 18, 'the blocks')
     spin_until(
         lambda: any(

@@ -8,8 +8,8 @@ from support.node_bench import Bench
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.messages import samples_to_message
 from lathe_chatter.nodes.sample_stream import Fed, SampleFeed, together
+from lathe_chatter.samples.codec import encode_block
 
 COLUMNS = ('time', 'tool_displacement')
 
@@ -43,10 +43,10 @@ def test_what_is_no_block_is_complained_of_and_the_rest_taken(bench: Bench) -> N
     taken: list[Fed] = []
     feed = SampleFeed(bench.node, complaints.append)
     publisher = bench.talk(Float64MultiArray, 'lathe/samples')
-    publisher.publish(samples_to_message(block(0, 20), COLUMNS))
+    publisher.publish(encode_block(block(0, 20), COLUMNS))
     publisher.publish(Float64MultiArray(data=[1.0, 2.0]))
-    publisher.publish(samples_to_message(block(20, 20), COLUMNS))
-    publisher.publish(samples_to_message(block(40, 20), ('time', 'workpiece_displacement')))
+    publisher.publish(encode_block(block(20, 20), COLUMNS))
+    publisher.publish(encode_block(block(40, 20), ('time', 'workpiece_displacement')))
 
     def has_all() -> bool:
         taken.extend(feed.take())

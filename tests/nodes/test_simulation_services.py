@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from std_msgs.msg import Float64MultiArray
-from support.node_bench import Bench
+from support.node_bench import Bench, samples_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
-from lathe_chatter.nodes.messages import samples_from_message
 
 pytest.importorskip('simulation_interfaces', reason='simulation_interfaces is not installed')
 
@@ -95,7 +94,7 @@ def test_steps_only_while_paused_and_the_same_run_after_a_reset(lathe: Bench) ->
         assert step(lathe, 5).result == Result.RESULT_OK
         lathe.spin_until(lambda: len(blocks) == heard + 5, '5 ticks')  # noqa: B023 -- called here
         assert state_of(lathe) == PAUSED
-        runs.append(np.vstack([samples_from_message(block)[0] for block in blocks[heard:]]))
+        runs.append(np.vstack([samples_of(block) for block in blocks[heard:]]))
     assert runs[0][0, 0] == 1e-4
     assert np.array_equal(runs[0], runs[1])
     assert step(lathe, 10**9).result == Result.RESULT_OPERATION_FAILED

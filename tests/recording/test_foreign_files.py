@@ -88,8 +88,8 @@ def number_at(row: int, value: float) -> Alter:
     ('alter', 'said'),
     [
         (lambda k, data: data[:100] if k == 30 else data, 'is cut off'),
-        (lambda k, data: b'\xff' * len(data) if k == 30 else data, 'is not little-endian CDR'),
-        (lambda _k, _data: b'', 'is not little-endian CDR'),
+        (lambda k, data: b'\xff' * len(data) if k == 30 else data, 'is not CDR'),
+        (lambda _k, _data: b'', 'is not CDR'),
         (number_at(0, np.nan), 'the times of 1 samples are no numbers'),
         (number_at(7, np.inf), 'the times of 1 samples are no numbers'),
         (number_at(19, 1e300), 'some samples are missing between 0.061900 s and 1e+300 s'),

@@ -13,10 +13,10 @@ from lathe_chatter.lathe.cut_events import BEGINNING, change_sentence
 from lathe_chatter.model import Cut
 from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
-from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, samples_bytes
+from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes
 from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
-from lathe_chatter.samples.codec import SAMPLES_TYPE
+from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 TICK = 2_000_000
 
@@ -73,7 +73,7 @@ def test_a_lathe_that_was_started_again_is_judged_by_its_own_parameters() -> Non
 
 
 def receive(run_log: RunLog, lathe: VirtualLathe, *, at: int) -> None:
-    data = samples_bytes(lathe.advance(20))
+    data = encode_block(lathe.advance(20))
     run_log.receive('/lathe/samples', SAMPLES_TYPE, data, at, at)
 
 
@@ -106,7 +106,7 @@ def test_a_message_that_is_no_block_is_told_and_harms_nothing() -> None:
     run_log, lathe = RunLog(), VirtualLathe()
     receive(run_log, lathe, at=0)
     run_log.receive('/lathe/samples', SAMPLES_TYPE, b'\x00\x01\x00\x00nonsense', 1, 1)
-    run_log.receive('/lathe/samples', SAMPLES_TYPE, samples_bytes(lathe.advance(20))[:-1], 2, 2)
+    run_log.receive('/lathe/samples', SAMPLES_TYPE, encode_block(lathe.advance(20))[:-1], 2, 2)
     assert 'cut off' in run_log.samples['/lathe/samples'].complaint
     receive(run_log, lathe, at=3)
     assert run_log.samples['/lathe/samples'].continuity.samples == 40

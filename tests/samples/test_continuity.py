@@ -9,7 +9,7 @@ import pytest
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.samples.continuity import Continuity, Joint, follow_evenly, times_of
+from lathe_chatter.samples.continuity import BlockOrder, Continuity, follow_evenly, times_of
 
 RATE = 1e4
 
@@ -24,9 +24,9 @@ def test_blocks_that_follow_each_other_are_contiguous_after_any_time(
     start: int, size: int
 ) -> None:
     heard = Continuity()
-    joints = [heard.join(times(start + k * size, size)) for k in range(1, 50)]
-    expected = [Joint.FIRST] + [Joint.CONTIGUOUS] * 48
-    assert joints[2 if size == 1 else 0 :] == expected[2 if size == 1 else 0 :]
+    orders = [heard.join(times(start + k * size, size)) for k in range(1, 50)]
+    expected = [BlockOrder.FIRST] + [BlockOrder.CONTIGUOUS] * 48
+    assert orders[2 if size == 1 else 0 :] == expected[2 if size == 1 else 0 :]
     assert (heard.samples, heard.lost) == (49 * size, 0)
 
 
@@ -36,8 +36,8 @@ def test_every_lost_sample_is_counted() -> None:
     heard.join(times(0, 20))
     next_sample, lost = 20, 0
     for missing in random.integers(0, 5, 200).tolist():
-        joint = heard.join(times(next_sample + missing, 20))
-        assert joint is (Joint.GAP if missing else Joint.CONTIGUOUS)
+        order = heard.join(times(next_sample + missing, 20))
+        assert order is (BlockOrder.GAP if missing else BlockOrder.CONTIGUOUS)
         next_sample += missing + 20
         lost += missing
     assert heard.lost == lost
@@ -47,15 +47,15 @@ def test_every_lost_sample_is_counted() -> None:
 def test_time_that_goes_back_is_another_run() -> None:
     heard = Continuity()
     heard.join(times(5000, 20))
-    assert heard.join(times(1, 20)) is Joint.RESTART
-    assert heard.join(times(21, 20)) is Joint.CONTIGUOUS
+    assert heard.join(times(1, 20)) is BlockOrder.RESTART
+    assert heard.join(times(21, 20)) is BlockOrder.CONTIGUOUS
     assert (heard.lost, heard.restarts) == (0, 1)
 
 
 def test_a_block_that_comes_twice_is_no_loss() -> None:
     heard = Continuity()
     heard.join(times(0, 20))
-    assert heard.join(times(0, 20)) is Joint.RESTART
+    assert heard.join(times(0, 20)) is BlockOrder.RESTART
     assert heard.lost == 0
 
 
@@ -92,7 +92,7 @@ def test_samples_without_times_are_refused() -> None:
 def test_samples_of_another_lathe_are_not_missing() -> None:
     heard = Continuity()
     heard.join(times(0, 100))
-    assert heard.join(times(300, 100), lambda: True) is Joint.RESTART
-    assert heard.join(times(400, 100), lambda: True) is Joint.CONTIGUOUS
-    assert heard.join(times(700, 100), lambda: False) is Joint.GAP
+    assert heard.join(times(300, 100), lambda: True) is BlockOrder.RESTART
+    assert heard.join(times(400, 100), lambda: True) is BlockOrder.CONTIGUOUS
+    assert heard.join(times(700, 100), lambda: False) is BlockOrder.GAP
     assert (heard.restarts, heard.gaps, heard.lost) == (1, 1, 200)

@@ -11,7 +11,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 from std_srvs.srv import SetBool, Trigger
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.samples.codec import SampleDecoder
 
 DEEP = QoSProfile(depth=5000)
 LATCHED = QoSProfile(depth=5000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -92,3 +96,8 @@ class Bench:
 
 def messages_of(values: dict[str, Any]) -> list[ParameterMessage]:
     return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+
+
+def samples_of(message: Any) -> Array:
+    """The samples (n, 8) of a message that ROS has decoded."""
+    return SampleDecoder().decode(serialize_message(message))[0]

@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray
 
 import lathe_chatter
-from lathe_chatter.nodes.messages import BlockReader
+from lathe_chatter.samples.codec import SampleDecoder
 from support.node_bench import LATCHED, Bench
 
 MODULES = {
@@ -110,13 +110,13 @@ class Samples:
         self.ends: list[float] = []
         self.sent: list[int] = []
         self._times: list[Any] = []
-        self._reader = BlockReader()
+        self._decoder = SampleDecoder()
         durability = DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE
         qos = QoSProfile(depth=_PLENTY, durability=durability)
         bench.node.create_subscription(Float64MultiArray, topic, self._note, qos, raw=True)
 
     def _note(self, data: bytes, info: dict[str, int]) -> None:
-        samples, columns = self._reader.read(data)
+        samples, columns = self._decoder.decode(data)
         self._times.append(samples[:, columns.index('time')].copy())
         self.ends.append(float(samples[-1, columns.index('time')]))
         self.sent.append(info['source_timestamp'])
