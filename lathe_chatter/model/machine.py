@@ -230,6 +230,12 @@ class Machine:
         d[1::2] = push
         return a, b, d
 
+    def _repr_html_(self) -> str:
+        """As a notebook shows it."""
+        from lathe_chatter.model.parameter_table import html_of
+
+        return html_of(self)
+
 
 _PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
 

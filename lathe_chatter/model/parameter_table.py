@@ -183,7 +183,8 @@ def rows_of(instance: Any, *, prefix: str = '', run_time: bool = False) -> Itera
     """The rows of a frozen value of the model, with its values as defaults.
 
     Args:
-        instance: A dataclass whose fields are quantities, choices, or such dataclasses.
+        instance: A dataclass whose fields are quantities, choices, such dataclasses, or tuples of
+            them, which are numbered.
         prefix: Put before each name, with its dot.
         run_time: Whether they may change while the node runs.
     """
@@ -196,6 +197,9 @@ def rows_of(instance: Any, *, prefix: str = '', run_time: bool = False) -> Itera
         elif isinstance(value, Enum):
             meaning = (type(value).__doc__ or '').partition('.')[0].partition(' (')[0]
             yield Row(name, value.value, meaning, choices=type(value), run_time=run_time)
+        elif isinstance(value, tuple):
+            for number, part in enumerate(value, 1):
+                yield from rows_of(part, prefix=f'{name}.{number}.', run_time=run_time)
         elif limits is not None:
             yield Row(name, value, limits.meaning, limits, run_time=run_time)
 

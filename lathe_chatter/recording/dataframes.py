@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Samples
-from lathe_chatter.samples import SAMPLE_COLUMNS
-
-UNITS: Mapping[str, str] = dict(
-    zip(SAMPLE_COLUMNS, ('s', 'rev', 'm', 'm/s', 'm', 'm/s', 'm', 'N'), strict=True)
-)
-"""SI, and revolutions."""
+from lathe_chatter.samples.columns import UNITS
 
 
 class MissingPackageError(LatheChatterError):

@@ -17,13 +17,14 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.recording.atomic_output import atomic_folder
-from lathe_chatter.recording.dataframes import UNITS, optional
+from lathe_chatter.recording.dataframes import optional
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run, RunReadError
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples.codec import encode_number
+from lathe_chatter.samples.columns import UNITS
 from lathe_chatter.samples.continuity import Continuity, time_text
 
 NUMBER_TYPE = 'std_msgs/msg/Float64'

@@ -6,12 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mcap.writer import MCAP0_MAGIC
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from lathe_chatter.html_table import html_table
 from lathe_chatter.recording.bag_folder import RunFolder, RunReadError, run_folder
 from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.mcap_reader import Damage
@@ -20,6 +21,9 @@ from lathe_chatter.recording.run_file import Contents, Note, RecordedFile
 from lathe_chatter.recording.sample_reader import TIME, SampleBlocks, sample_blocks
 from lathe_chatter.recording.sample_series import Samples, joined, selection
 from lathe_chatter.samples.codec import SAMPLES_TYPE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 
@@ -168,6 +172,38 @@ class Run:
             names = ', '.join(missing)
             raise RunReadError(f'The samples of {name} in {self.path} have no column {names}.')
         return found
+
+    def plot(self, *columns: str, axes: Axes | None = None) -> Axes:
+        """Plot samples over simulated time, with the times of flagged chatter shaded.
+
+        Args:
+            columns: Their names, of one unit; by default the displacements.
+            axes: To draw into; by default those of a new figure.
+
+        Returns:
+            The axes.
+
+        Raises:
+            ParameterError: If there is no such column, or they have several units.
+            RunReadError: If a file is damaged, or the samples of several lathes are there.
+        """
+        from lathe_chatter.recording.plots import plot_run
+
+        return plot_run(self, columns, axes)
+
+    def __repr__(self) -> str:
+        """Where it is, and of how many files."""
+        return f'<Run {self.path}: {len(self.files)} file{"s" * (len(self.files) != 1)}>'
+
+    def _repr_html_(self) -> str:
+        """As a notebook shows it: what its files hold, by what they say themselves."""
+        rows: list[tuple[str, object, str]] = [
+            ('path', self.path, ''),
+            ('files', len(self.files), ''),
+            ('messages', self.count_of_messages(), ''),
+        ]
+        rows += [(topic, kind, '') for topic, kind in sorted(self.topics.items())]
+        return html_table('Run', rows)
 
     def without_samples(self, topic: str) -> RunReadError:
         """The error of a topic that has no samples: it says which have."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from numbers import Real
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,9 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.recording.sample_reader import SampleBlocks
 from lathe_chatter.samples.continuity import Continuity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Selection(NamedTuple):
@@ -88,6 +91,32 @@ class Samples(NamedTuple):
         asked = np.asarray(log_times, np.int64) - self.log_times[0]
         found: Array = np.interp(asked.astype(float), relative, self.block_ends)
         return found
+
+    def plot(self, *columns: str, axes: Axes | None = None) -> Axes:
+        """Plot columns of one unit, by default the displacements, over simulated time.
+
+        Args:
+            columns: Their names.
+            axes: To draw into; by default those of a new figure.
+
+        Returns:
+            The axes.
+
+        Raises:
+            ParameterError: If there is no such column, or they have several units.
+        """
+        from lathe_chatter.recording.plots import plot_samples
+
+        return plot_samples(self, columns, axes)
+
+    def __repr__(self) -> str:
+        """How many of what from when to when."""
+        count = len(self.block_ends) and len(next(iter(self.columns.values())))
+        times = self.columns.get('time', self.block_ends)
+        span = f' from {times[0]:g} to {times[-1]:g} s' if len(times) else ''
+        missing = f', {len(self.gaps)} gaps' if self.gaps else ''
+        again = f', {len(self.restarts)} restarts' if self.restarts else ''
+        return f'<Samples: {count} of {", ".join(self.columns)}{span}{missing}{again}>'
 
 
 def joined(blocks: Iterable[SampleBlocks], expected: int, wanted: Selection) -> Samples | None:

@@ -9,4 +9,6 @@ STATE_FIELDS = (
     'workpiece_velocity',
 )
 SAMPLE_COLUMNS = ('time', 'spindle_angle', *STATE_FIELDS, 'chip_thickness', 'cutting_force')
-"""The columns of a block of samples: s, rev, m, m/s, m, m/s, m, N."""
+"""The columns of a block of samples."""
+UNITS = dict(zip(SAMPLE_COLUMNS, ('s', 'rev', 'm', 'm/s', 'm', 'm/s', 'm', 'N'), strict=True))
+"""Their units: SI, and revolutions."""

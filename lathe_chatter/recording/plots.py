@@ -1,0 +1,69 @@
+"""Samples over time as a plot, into axes that are given or new."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.plot_style import ALARM, axes_or_new, envelope, grid, scale_for
+from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.samples.columns import UNITS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from lathe_chatter.recording.run import Run
+    from lathe_chatter.recording.sample_series import Samples
+
+_USUAL = ('tool_displacement', 'workpiece_displacement')
+_FLAG = 'chatter_monitor/chatter'
+
+
+def plot_samples(samples: Samples, columns: Iterable[str], axes: Axes | None) -> Axes:
+    """Plot columns of one unit over simulated time, with missing samples in grey.
+
+    Raises:
+        ParameterError: If there is no such column, no time, or several units.
+    """
+    known = [name for name in samples.columns if name != TIME]
+    names = [*columns] or [name for name in _USUAL if name in known] or known[:1]
+    unknown = next((name for name in names if name not in known), None)
+    if unknown is not None:
+        raise ParameterError('columns', unknown, '', f'some of {", ".join(known)}')
+    if TIME not in samples.columns:
+        raise ParameterError('columns', ', '.join(known), '', 'read together with time')
+    units = {UNITS.get(name, '') for name in names}
+    if len(units) > 1:
+        raise ParameterError('columns', ', '.join(names), '', 'columns of one unit')
+    axes = axes_or_new(axes)
+    time = samples.columns[TIME]
+    scale = scale_for(units.pop(), *(samples.columns[name] for name in names))
+    for number, name in enumerate(names):
+        label = name.replace('_', ' ')
+        envelope(axes, time, samples.columns[name] * scale.factor, f'C{number}', label)
+    for before, after in samples.gaps:
+        axes.axvspan(before, after, color='0.85', lw=0)
+    axes.set_xlabel('simulated time / s')
+    axes.set_ylabel(scale.label('value') if len(names) > 1 else scale.label(names[0]))
+    axes.legend(loc='upper left', fontsize=9)
+    grid(axes)
+    return axes
+
+
+def plot_run(run: Run, columns: Iterable[str], axes: Axes | None) -> Axes:
+    """The same of a run, with the times at which the monitor flagged chatter shaded."""
+    samples: Any = run.samples()
+    axes = plot_samples(samples, columns, axes)
+    topic = next((name for name in sorted(run.topics) if name.endswith(_FLAG)), None)
+    raised: float | None = None
+    for recorded in run.messages(topic) if topic else ():
+        (time,) = samples.simulated_time([recorded.log_time]).tolist()
+        if recorded.message.data and raised is None:
+            raised = time
+        elif not recorded.message.data and raised is not None:
+            axes.axvspan(raised, time, color=ALARM, alpha=0.2, lw=0)
+            raised = None
+    if raised is not None:
+        axes.axvspan(raised, float(samples.block_ends[-1]), color=ALARM, alpha=0.2, lw=0)
+    return axes

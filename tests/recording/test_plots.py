@@ -1,0 +1,67 @@
+"""Plots of a run and its samples, and how short both show themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import lathe_chatter as lc
+from lathe_chatter.errors import ParameterError
+
+HERE = Path(__file__).parent
+RUN = HERE.parent / 'golden' / 'run'
+
+
+def test_samples_are_plotted_into_the_axes_given() -> None:
+    samples = lc.read_run(RUN).samples()
+    axes = Figure().subplots()
+    assert samples.plot('tool_displacement', axes=axes) is axes
+    time = samples.columns['time']
+    assert axes.dataLim.x0 >= time[0]
+    assert axes.dataLim.x1 <= time[-1]
+    highest = samples.columns['tool_displacement'].max()
+    drawn = axes.dataLim.y1 / (1e3 if 'mm' in axes.get_ylabel() else 1e6)
+    assert drawn == pytest.approx(highest, rel=1e-9)
+
+
+def test_a_run_is_plotted_with_what_the_monitor_flagged(tmp_path: Path) -> None:
+    scenario = lc.Scenario('test', 'Test', 3.0, {'depth_of_cut': 1.2e-3})
+    lc.simulate(scenario, tmp_path / 'run', monitor=True)
+    run = lc.read_run(tmp_path / 'run')
+    axes = run.plot(axes=Figure().subplots())
+    shades = [patch.get_x() for patch in axes.patches]
+    flagged = [m.log_time for m in run.messages('/chatter_monitor/chatter') if m.message.data]
+    assert shades == pytest.approx(run.samples().simulated_time(flagged).tolist())
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        'tool displacement',
+        'workpiece displacement',
+    ]
+
+
+@pytest.mark.parametrize(
+    ('columns', 'words'),
+    [
+        (['tool'], "columns is 'tool': it must be some of"),
+        (['tool_displacement', 'cutting_force'], 'columns of one unit'),
+    ],
+)
+def test_what_cannot_be_plotted_is_named(columns: list[str], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        lc.read_run(RUN).samples().plot(*columns, axes=Figure().subplots())
+
+
+def test_both_show_themselves_in_a_line() -> None:
+    run = lc.read_run(RUN)
+    assert repr(run) == f'<Run {RUN}: 1 file>'
+    samples = run.samples(columns=['tool_velocity'])
+    count, ends = len(samples.columns['tool_velocity']), samples.block_ends
+    shown = f'{count} of tool_velocity from {ends[0]:g} to {ends[-1]:g} s'
+    assert repr(samples) == f'<Samples: {shown}>'
+    with pytest.raises(ParameterError, match='read together with time'):
+        samples.plot(axes=Figure().subplots())
+    assert '/lathe/samples' in run._repr_html_()
+    empty = lc.Samples({'time': np.zeros(0)}, np.zeros(0, np.int64), np.zeros(0), [], [])
+    assert repr(empty) == '<Samples: 0 of time>'
