@@ -1,0 +1,403 @@
+"""The modes that a frequency response shows, each figure with its standard error.
+
+At the point where the tool cuts, a body of n modes has the receptance
+
+    H(omega) = sum_k 1 / (k_k - m_k omega^2 + i c_k omega) + a + b/omega^2
+
+with a for the modes above the band and b for those below (Ewins, Modal Testing, 2.4). Poles from
+the least-squares complex frequency method (sdypy-EMA) are candidates; modes are taken from them
+one at a time, the one that explains most first, while the Bayesian information criterion falls;
+SciPy's least squares refines all figures together. The noise of each frequency is what the
+coherence says, scaled by the residual, or a floor and a share of the response, both found from
+the residual.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import least_squares, nnls
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.tap_test.frequency_response import Complex, FrequencyResponse
+
+MOST_MODES = 8
+_POLE_ORDER = 40
+_AGREEING = 5
+"""Orders that must agree on a pole before it is a candidate."""
+_MOST_CALLS = 200
+_ROUNDS = 3
+"""Of fitting and weighing in turn; the weights settle in two or three."""
+
+
+class ModalFitError(LatheChatterError, ValueError):
+    """Frequency responses to which no modes can be fitted, and why."""
+
+
+@dataclass(frozen=True)
+class FittedMode:
+    """A mode with its standard errors.
+
+    Attributes:
+        frequency: Undamped natural frequency, Hz.
+        damping_ratio: zeta.
+        stiffness: Modal stiffness at the measured point, N/m.
+        errors: Standard errors of these three, in their units.
+    """
+
+    frequency: float
+    damping_ratio: float
+    stiffness: float
+    errors: tuple[float, float, float]
+
+    @property
+    def mass(self) -> float:
+        """Modal mass k/omega^2, kg."""
+        return self.stiffness / (2.0 * math.pi * self.frequency) ** 2
+
+
+@dataclass(frozen=True)
+class ModalFit:
+    """What was found.
+
+    Attributes:
+        modes: In ascending frequency.
+        covariance: Of (ln frequency, ln damping ratio, ln stiffness) of each mode in turn
+            (3n, 3n).
+        responses: What was fitted.
+        fitted: The model in the form of each of them.
+        deviations: Standard deviation of the noise of each value of each of them.
+        warnings: What is to be known before the machine is believed, in sentences.
+    """
+
+    modes: tuple[FittedMode, ...]
+    covariance: Array = field(repr=False)
+    responses: tuple[FrequencyResponse, ...] = field(repr=False)
+    fitted: tuple[Complex, ...] = field(repr=False)
+    deviations: tuple[Array, ...] = field(repr=False)
+    warnings: tuple[str, ...] = ()
+
+
+def fit_modes(
+    responses: Sequence[FrequencyResponse],
+    *,
+    modes: int | None = None,
+    lowest_frequency: float = 0.0,
+    highest_frequency: float = math.inf,
+) -> ModalFit:
+    """Fit modes to the frequency responses of one body, measured at one point.
+
+    Args:
+        responses: One or more measurements of the same point.
+        modes: How many; None finds their number.
+        lowest_frequency: Of what is fitted, Hz.
+        highest_frequency: Of what is fitted, Hz.
+
+    Raises:
+        ModalFitError: If there is too little to fit, or nothing that vibrates.
+    """
+    if modes is not None and not 1 <= modes <= MOST_MODES:
+        raise ModalFitError(f'modes is {modes}: it must be from 1 to {MOST_MODES}.')
+    band = tuple(r.within(lowest_frequency, highest_frequency) for r in responses)
+    fit = _Fit(band)
+    candidates = _candidates(band)
+    poles: list[tuple[float, float]] = []
+    best: tuple[float, Array, list[tuple[float, float]]] | None = None
+    while len(poles) < (modes or MOST_MODES):
+        found = _next_pole(fit, poles, candidates)
+        if found is None:
+            break
+        parameters = fit.refine([*poles, found])
+        poles = fit.poles_of(parameters)
+        score = fit.information(parameters)
+        if modes is None and best is not None and score > best[0] - 10.0:
+            break
+        best = (score, parameters, poles)
+    if best is None or (modes is not None and len(poles) < modes):
+        raise ModalFitError(
+            f'{band[0].source}: {modes or "no"} modes could not be found between '
+            f'{band[0].frequency[0]:g} and {band[0].frequency[-1]:g} Hz.'
+        )
+    return fit.result(best[1])
+
+
+class _Fit:
+    """The least-squares problem of some responses with common modes."""
+
+    def __init__(self, responses: tuple[FrequencyResponse, ...]) -> None:
+        self.responses = responses
+        self.omega = [2.0 * np.pi * r.frequency for r in responses]
+        self.factor = [r.of_receptance for r in responses]
+        self.deviations = [self._first_deviations(r) for r in responses]
+        ends = [(w[0], w[-1]) for w in self.omega]
+        self.lowest, self.highest = min(e[0] for e in ends), max(e[1] for e in ends)
+
+    @staticmethod
+    def _first_deviations(response: FrequencyResponse) -> Array:
+        """Noise by the roughness of the curve: its second differences, smoothed nowhere."""
+        rough = np.abs(np.diff(response.response, 2)) / math.sqrt(6.0)
+        floor = float(np.median(rough)) / math.sqrt(math.log(2.0)) / math.sqrt(2.0)
+        level = max(floor, 1e-9 * float(np.abs(response.response).max()))
+        return np.full(response.frequency.size, level)
+
+    def columns(self, poles: Sequence[tuple[float, float]], k: int) -> Complex:
+        """The response of each pole with unit 1/m, and of what lies outside the band (n, m + 2).
+
+        The two residuals are of order one at the ends of the band.
+        """
+        w = self.omega[k]
+        shapes = [
+            self.factor[k] / (p**2 - w**2 + 2j * z * p * w) for p, z in poles
+        ]
+        above = self.factor[k] / self.highest**2
+        below = -self.factor[k] / w**2
+        return np.column_stack([*shapes, above, below])
+
+    def amplitudes(self, poles: Sequence[tuple[float, float]]) -> tuple[Array, float]:
+        """1/m of each pole and the residuals by linear least squares, and the cost left."""
+        blocks, targets = [], []
+        for k, response in enumerate(self.responses):
+            weighed = self.columns(poles, k) / self.deviations[k][:, None]
+            target = response.response / self.deviations[k]
+            blocks += [weighed.real, weighed.imag]
+            targets += [target.real, target.imag]
+        matrix, target = np.concatenate(blocks), np.concatenate(targets)
+        scale = np.linalg.norm(matrix, axis=0)
+        found, *_ = np.linalg.lstsq(matrix / scale, target, rcond=1e-12)
+        left = target - matrix / scale @ found
+        return found / scale, float(left @ left)
+
+    def model(self, parameters: Array) -> list[Complex]:
+        """The responses that parameters give."""
+        poles, amplitudes = self.poles_of(parameters), self._amplitudes_of(parameters)
+        return [self.columns(poles, k) @ amplitudes for k in range(len(self.responses))]
+
+    @staticmethod
+    def poles_of(parameters: Array) -> list[tuple[float, float]]:
+        """omega and zeta of each mode."""
+        n = (parameters.size - 2) // 3
+        inside = np.clip(parameters, -40.0, 40.0)  # a search that has lost its way stays finite
+        return [(math.exp(inside[3 * k]), math.exp(inside[3 * k + 1])) for k in range(n)]
+
+    @staticmethod
+    def _amplitudes_of(parameters: Array) -> Array:
+        """1/m of each mode from its ln k, and the two residuals."""
+        modes = parameters[:-2].reshape(-1, 3)
+        exponents = np.clip(2.0 * modes[:, 0] - modes[:, 2], -80.0, 80.0)
+        return np.concatenate([np.exp(exponents), parameters[-2:]])
+
+    def _residual(self, parameters: Array) -> Array:
+        parts = []
+        for response, model, deviation in zip(
+            self.responses, self.model(parameters), self.deviations, strict=True
+        ):
+            left = (model - response.response) / deviation
+            parts += [left.real, left.imag]
+        return np.concatenate(parts)
+
+    def _jacobian(self, parameters: Array) -> Array:
+        """Of `_residual`, in closed form (2n, parameters)."""
+        poles, amplitudes = self.poles_of(parameters), self._amplitudes_of(parameters)
+        blocks = []
+        for k, deviation in enumerate(self.deviations):
+            w, shapes = self.omega[k], self.columns(poles, k)
+            columns = []
+            for (p, z), a, shape in zip(poles, amplitudes[:-2], shapes.T, strict=False):
+                response = a * shape
+                per_d = response * shape / self.factor[k]
+                columns += [
+                    2.0 * response - per_d * (2.0 * p**2 + 2j * z * p * w),
+                    -per_d * 2j * z * p * w,
+                    -response,
+                ]
+            slopes = np.column_stack([*columns, *shapes.T[-2:]]) / deviation[:, None]
+            blocks += [slopes.real, slopes.imag]
+        return np.concatenate(blocks)
+
+    def refine(self, poles: Sequence[tuple[float, float]]) -> Array:
+        """All parameters together, with weights that are found from what is left."""
+        amplitudes, _ = self.amplitudes(poles)
+        largest = float(np.abs(amplitudes[: len(poles)]).max())
+        parameters = np.array(
+            [
+                value
+                for (p, z), a in zip(poles, amplitudes[:-2], strict=True)
+                for value in (math.log(p), math.log(z), math.log(p**2 / max(a, 1e-3 * largest)))
+            ]
+            + list(amplitudes[-2:])
+        )
+        for _ in range(_ROUNDS):
+            scale = np.ones(parameters.size)
+            scale[-2:] = np.maximum(np.abs(parameters[-2:]), largest)
+            solved = least_squares(
+                self._residual,
+                parameters,
+                self._jacobian,
+                x_scale=scale,
+                method='lm',
+                max_nfev=_MOST_CALLS,
+            )
+            parameters = np.asarray(solved.x, float)
+            self._weigh(parameters)
+        return parameters
+
+    def _weigh(self, parameters: Array) -> None:
+        """Find the noise of each value from what the model leaves.
+
+        The variance of each is sought as floor^2 + share^2 |H|^2, or with the coherence g as
+        floor^2 + share^2 |H|^2 (1 - g)/g; both are sums of squares, fitted by the mean of
+        |left|^2 with its own scatter as weight.
+        """
+        for k, (response, model) in enumerate(
+            zip(self.responses, self.model(parameters), strict=True)
+        ):
+            left = np.abs(model - response.response) ** 2 / 2.0
+            shape = np.abs(model) ** 2
+            if response.coherence is not None:
+                g = np.clip(_smooth(response.coherence), 1e-3, 1.0 - 1e-9)
+                shape = shape * (1.0 - g) / g
+            variance = np.maximum(self.deviations[k] ** 2, 1e-30)
+            for _ in range(6):
+                matrix = np.column_stack([np.ones(left.size), shape]) / variance[:, None]
+                scale = np.linalg.norm(matrix, axis=0) + 1e-300
+                found, _ = nnls(matrix / scale, left / variance)
+                variance = np.column_stack([np.ones(left.size), shape]) @ (found / scale)
+                variance = np.maximum(variance, 1e-12 * float(np.max(np.abs(model)) ** 2))
+            self.deviations[k] = np.sqrt(variance)
+
+    def information(self, parameters: Array) -> float:
+        """The Bayesian information criterion: less is better."""
+        left = self._residual(parameters)
+        deviations = np.concatenate([np.repeat(d, 2) for d in self.deviations])
+        likelihood = float(left @ left) + 2.0 * float(np.log(deviations).sum())
+        return likelihood + parameters.size * math.log(left.size)
+
+    def result(self, parameters: Array) -> ModalFit:
+        """The modes in ascending order, with their covariance and what is to be warned of."""
+        parameters = self.refine(self.poles_of(parameters))
+        n = (parameters.size - 2) // 3
+        jacobian = self._jacobian(parameters)
+        scale = np.linalg.norm(jacobian, axis=0)
+        inverse = np.linalg.pinv(jacobian / scale)
+        whole = (inverse @ inverse.T) / np.outer(scale, scale)
+        order = np.argsort(parameters[:-2:3])
+        index = np.concatenate([np.arange(3) + 3 * k for k in order])
+        covariance = whole[np.ix_(index, index)]
+        modes = []
+        for place, k in enumerate(order):
+            frequency = math.exp(parameters[3 * k]) / (2.0 * math.pi)
+            values = (frequency, *np.exp(parameters[3 * k + 1 : 3 * k + 3]))
+            spread = np.sqrt(np.diag(covariance)[3 * place : 3 * place + 3])
+            errors = tuple(float(v * s) for v, s in zip(values, spread, strict=True))
+            modes.append(FittedMode(values[0], float(values[1]), float(values[2]), errors))
+        assert len(modes) == n
+        found = tuple(modes)
+        return ModalFit(
+            found,
+            covariance,
+            self.responses,
+            tuple(self.model(parameters)),
+            tuple(self.deviations),
+            tuple(_warnings(found, self.responses)),
+        )
+
+
+def _smooth(values: Array, width: int = 5) -> Array:
+    """A running mean: single values of a coherence scatter."""
+    padded = np.pad(values, width // 2, mode='edge')
+    return np.convolve(padded, np.full(width, 1.0 / width), 'valid')
+
+
+def _candidates(responses: Sequence[FrequencyResponse]) -> list[tuple[float, float]]:
+    """Poles (omega, zeta) of the first response by the complex frequency method, every order."""
+    with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
+        warnings.simplefilter('ignore')
+        try:
+            from sdypy import EMA
+        except ImportError:
+            raise ModalFitError(
+                "A tap test needs the package sdypy-EMA: pip install 'lathe_chatter[identify]'."
+            ) from None
+        response = responses[0]
+        frequency = response.frequency
+        order = min(_POLE_ORDER, frequency.size // 8)
+        model = EMA.Model(
+            frf=(response.response / response.of_receptance)[None, :],
+            freq=frequency,
+            lower=float(frequency[0]),
+            upper=float(frequency[-1]),
+            pol_order_high=int(order),
+            frf_form='receptance',
+        )
+        model.get_poles(method='lscf', show_progress=False)
+    poles = np.concatenate([np.atleast_1d(np.asarray(p, complex)) for p in model.all_poles])
+    size = np.abs(poles)
+    damping = -poles.real / np.maximum(size, 1e-300)
+    inside = (poles.imag > 0.0) & (damping > 1e-5) & (damping < 0.5)
+    inside &= (size > 2.0 * np.pi * frequency[0]) & (size < 2.0 * np.pi * frequency[-1])
+    return _clusters(size[inside], damping[inside])
+
+
+def _clusters(size: Array, damping: Array) -> list[tuple[float, float]]:
+    """The poles that several orders agree on, to 1 % of the frequency: a mode stays, noise moves."""
+    by_size = np.argsort(size)
+    size, damping = size[by_size], damping[by_size]
+    edges = np.flatnonzero(np.diff(size) > 0.003 * size[1:]) + 1
+    return [
+        (float(np.median(p)), float(np.median(z)))
+        for p, z in zip(np.split(size, edges), np.split(damping, edges), strict=True)
+        if p.size >= _AGREEING
+    ]
+
+
+def _next_pole(
+    fit: _Fit, poles: list[tuple[float, float]], candidates: list[tuple[float, float]]
+) -> tuple[float, float] | None:
+    """The candidate that explains most of what the poles so far leave, with a positive mass."""
+    best, least = None, math.inf
+    for candidate in candidates:
+        amplitudes, left = fit.amplitudes([*poles, candidate])
+        if amplitudes[len(poles)] > 0.0 and left < least:
+            best, least = candidate, left
+    return best
+
+
+def _warnings(
+    modes: Sequence[FittedMode], responses: Sequence[FrequencyResponse]
+) -> list[str]:
+    """What is to be known before the modes are believed."""
+    said = []
+    for mode in modes:
+        width = mode.damping_ratio * mode.frequency
+        for r in responses:
+            near = np.abs(r.frequency - mode.frequency) < max(width, np.diff(r.frequency).max())
+            if r.coherence is not None and near.any() and np.median(r.coherence[near]) < 0.8:
+                said.append(
+                    f'At {mode.frequency:.1f} Hz the coherence is '
+                    f'{np.median(r.coherence[near]):.2f}: that mode is not to be relied upon.'
+                )
+            low, high = r.frequency[0] + 2.0 * width, r.frequency[-1] - 2.0 * width
+            if not low < mode.frequency < high:
+                said.append(
+                    f'The mode at {mode.frequency:.1f} Hz lies at the edge of what was measured.'
+                )
+        if mode.errors[2] > 0.2 * mode.stiffness:
+            said.append(
+                f'The stiffness of the mode at {mode.frequency:.1f} Hz is known to '
+                f'{mode.errors[2] / mode.stiffness:.0%} only.'
+            )
+    for first, second in zip(modes, modes[1:], strict=False):
+        apart = second.frequency - first.frequency
+        if apart < first.damping_ratio * first.frequency + second.damping_ratio * second.frequency:
+            said.append(
+                f'The modes at {first.frequency:.1f} and {second.frequency:.1f} Hz lie closer '
+                'than they are wide: they may not be told apart.'
+            )
+    return said
