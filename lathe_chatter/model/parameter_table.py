@@ -16,6 +16,7 @@ from typing import Any, TypeGuard
 from lathe_chatter.errors import ParameterError, nearest_name
 from lathe_chatter.html_table import html_table
 from lathe_chatter.model.quantities import Quantity, check_choice, quantity_of
+from lathe_chatter.model.units import number_in
 
 Value = bool | int | float | str | list[str]
 Values = Mapping[str, Value]
@@ -87,14 +88,13 @@ class Row:
         raise ParameterError(self.name, value, self.unit, self.allowed)
 
     def parsed(self, value: object) -> object:
-        """The number that a text is, where this is a number (YAML takes `5.0e6` for a text)."""
+        """The number that a text is, alone or with a unit (YAML takes `5.0e6` for a text)."""
         if not isinstance(value, str) or self.limits is None:
             return value
         with suppress(ValueError):
             return int(value)
-        with suppress(ValueError):
-            return float(value)
-        return value
+        number = number_in(value, self.unit)
+        return value if number is None else number
 
 
 def _fits(value: object, default: Value) -> TypeGuard[int]:

@@ -125,7 +125,7 @@ def read_frequency_responses(path: Path | str) -> list[FrequencyResponse]:
 def _universal(path: Path) -> Iterator[FrequencyResponse]:
     """Those of a universal file, each with the coherence of the same two points."""
     try:
-        import pyuff  # noqa: PLC0415
+        import pyuff
     except ImportError:
         raise FrequencyResponseError(
             "Universal files need the package pyuff: pip install 'lathe_chatter[identify]'."

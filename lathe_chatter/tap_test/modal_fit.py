@@ -20,6 +20,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import least_squares, nnls
@@ -153,9 +154,7 @@ class _Fit:
         The two residuals are of order one at the ends of the band.
         """
         w = self.omega[k]
-        shapes = [
-            self.factor[k] / (p**2 - w**2 + 2j * z * p * w) for p, z in poles
-        ]
+        shapes = [self.factor[k] / (p**2 - w**2 + 2j * z * p * w) for p, z in poles]
         above = self.factor[k] / self.highest**2
         below = -self.factor[k] / w**2
         return np.column_stack([*shapes, above, below])
@@ -282,7 +281,6 @@ class _Fit:
     def result(self, parameters: Array) -> ModalFit:
         """The modes in ascending order, with their covariance and what is to be warned of."""
         parameters = self.refine(self.poles_of(parameters))
-        n = (parameters.size - 2) // 3
         jacobian = self._jacobian(parameters)
         scale = np.linalg.norm(jacobian, axis=0)
         inverse = np.linalg.pinv(jacobian / scale)
@@ -297,7 +295,6 @@ class _Fit:
             spread = np.sqrt(np.diag(covariance)[3 * place : 3 * place + 3])
             errors = tuple(float(v * s) for v, s in zip(values, spread, strict=True))
             modes.append(FittedMode(values[0], float(values[1]), float(values[2]), errors))
-        assert len(modes) == n
         found = tuple(modes)
         return ModalFit(
             found,
@@ -346,7 +343,7 @@ def _candidates(responses: Sequence[FrequencyResponse]) -> list[tuple[float, flo
 
 
 def _clusters(size: Array, damping: Array) -> list[tuple[float, float]]:
-    """The poles that several orders agree on, to 1 % of the frequency: a mode stays, noise moves."""
+    """The poles that several orders agree on: a mode stays where it is, noise moves."""
     by_size = np.argsort(size)
     size, damping = size[by_size], damping[by_size]
     edges = np.flatnonzero(np.diff(size) > 0.003 * size[1:]) + 1
@@ -369,9 +366,7 @@ def _next_pole(
     return best
 
 
-def _warnings(
-    modes: Sequence[FittedMode], responses: Sequence[FrequencyResponse]
-) -> list[str]:
+def _warnings(modes: Sequence[FittedMode], responses: Sequence[FrequencyResponse]) -> list[str]:
     """What is to be known before the modes are believed."""
     said = []
     for mode in modes:
@@ -393,7 +388,7 @@ def _warnings(
                 f'The stiffness of the mode at {mode.frequency:.1f} Hz is known to '
                 f'{mode.errors[2] / mode.stiffness:.0%} only.'
             )
-    for first, second in zip(modes, modes[1:], strict=False):
+    for first, second in pairwise(modes):
         apart = second.frequency - first.frequency
         if apart < first.damping_ratio * first.frequency + second.damping_ratio * second.frequency:
             said.append(
