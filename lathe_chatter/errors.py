@@ -43,6 +43,10 @@ class ScenarioError(LatheChatterError):
     """A scenario file that cannot be played; the text says what is wrong where."""
 
 
+class MachineFileError(LatheChatterError, ValueError):
+    """A machine file that cannot be used: with its line, and what is allowed there."""
+
+
 class KnockMapError(LatheChatterError):
     """A file that is no map of knocks, or not the one wanted."""
 

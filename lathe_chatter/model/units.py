@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from decimal import Decimal
 
 _TURN = 2.0 * math.pi
 _G = 9.80665
@@ -53,12 +54,13 @@ def number_in(text: str, unit: str) -> float | None:
     match = _VALUE.match(text)
     if match is None:
         return None
-    number, written = float(match[1]), _plain(match[2])
+    number, written = Decimal(match[1]), _plain(match[2])
     if not written:
-        return number
+        return float(number)
     factors = UNITS.get(unit, {unit: 1.0})
     factor = next((f for name, f in factors.items() if _plain(name) == written), None)
-    return None if factor is None else number * factor
+    # Decimal: 5 um is 5e-6 m, not the next number below it.
+    return None if factor is None else float(number * Decimal(repr(factor)))
 
 
 def _plain(unit: str) -> str:
