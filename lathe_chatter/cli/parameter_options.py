@@ -12,7 +12,9 @@ from lathe_chatter.model.parameters import LATHE
 
 def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()) -> None:
     """Declare an option for every parameter of a lathe, but for some."""
-    group = parser.add_argument_group('the lathe', 'in SI units; speeds in rev/min')
+    group = parser.add_argument_group(
+        'the lathe', 'in SI units (speeds in rev/min), or with a unit: "0.5 mm"'
+    )
     for row in LATHE:
         if row.node_only or row.name in without:
             continue
@@ -29,6 +31,8 @@ def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()
             group.add_argument(
                 flag, dest=row.name, choices=choices, help=f'(default: {row.default})'
             )
+        elif isinstance(row.default, str):
+            group.add_argument(flag, dest=row.name, metavar='FILE', help=text)
         else:
             unit = f', {row.unit}' if row.unit else ''
             # A text that is no number stays one: the parameter then says what it must be.

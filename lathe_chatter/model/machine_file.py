@@ -18,21 +18,21 @@ machine without one has no bearing clearance. docs/machine_file.md has every fie
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from lathe_chatter.errors import MachineFileError, ParameterError, nearest_name, reason_of
+from lathe_chatter.errors import MachineFileError, ParameterError, reason_of
 from lathe_chatter.model.cut import BearingContact, Cut
 from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.machine import Body, Machine, Mode
 from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.model.uncertainty import MODAL, Uncertainty
-from lathe_chatter.model.units import number_in, units_of
+from lathe_chatter.model.units import number_in
+from lathe_chatter.model.yaml_section import Section
 
 _TURN = 2.0 * np.pi
 _PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
@@ -59,6 +59,7 @@ _CUT = {
     'depth_of_cut': limits_of(Cut, 'depth_of_cut'),
     'feed': Quantity('feed per revolution', 'm', high=0.01),
 }
+_SPEED_RANGE = (('slowest', _SPEED.low), ('fastest', _SPEED.high))
 _SECTIONS = ('tool', 'workpiece', 'bearing', 'material', 'spindle', 'cut')
 
 
@@ -106,7 +107,7 @@ class MachineDescription:
         for name in ('tool', 'workpiece'):
             body: Body = getattr(self.machine, name)
             made[name] = {'modes': [_described(mode) for mode in body.modes]}
-            covariance = known and known.covariance_of(name, len(body.modes))
+            covariance = known.covariance_of(name, len(body.modes)) if known else None
             if covariance is not None:
                 made[name]['covariance'] = covariance.tolist()
         made['bearing'] = {
@@ -115,7 +116,7 @@ class MachineDescription:
             'contact': self.cut.bearing_contact.value,
         }
         made['material'] = {'cutting_coefficient': self.machine.cutting_coefficient}
-        error = known and known.error_of('cutting_coefficient')
+        error = known.error_of('cutting_coefficient') if known else None
         if error:
             made['material']['errors'] = {'cutting_coefficient': f'{100.0 * error!r} %'}
         made['spindle'] = {
@@ -183,149 +184,87 @@ def load_machine(source: Path | str) -> MachineDescription:
         raise MachineFileError(f'{name}{line}: {error.problem}.') from None
     except yaml.YAMLError as error:
         raise MachineFileError(f'{name}: {" ".join(str(error).split())}.') from None
-    return _description(_Section(node, name, ''), Path(name).stem)
+    return _description(Section(node, name, ''), Path(name).stem)
 
 
-class _Section:
-    """A mapping of a YAML file whose entries know their lines."""
-
-    def __init__(self, node: yaml.Node | None, file: str, path: str) -> None:
-        self.file, self.path = file, path
-        self.line = node.start_mark.line + 1 if node is not None else 1
-        if not isinstance(node, yaml.MappingNode):
-            raise self.refused('it must be a mapping of names to values')
-        self.nodes: dict[str, yaml.Node] = {}
-        for key, value in node.value:
-            if key.value in self.nodes:
-                raise self.refused(f'{key.value!r} stands there twice', key)
-            self.nodes[key.value] = value
-
-    def refused(self, text: str, node: yaml.Node | None = None) -> MachineFileError:
-        line = node.start_mark.line + 1 if node is not None else self.line
-        where = f'{self.path}: ' if self.path else ''
-        return MachineFileError(f'{self.file}, line {line}: {where}{text}.')
-
-    def only(self, *known: str) -> None:
-        for key, node in self.nodes.items():
-            if key not in known:
-                near = nearest_name(key, known)
-                hint = f'did you mean {near}?' if near else f'known are {", ".join(known)}'
-                raise self.refused(f'there is no {key!r}: {hint}'.removesuffix('?'), node)
-
-    def section(self, name: str) -> _Section | None:
-        node = self.nodes.get(name)
-        path = f'{self.path}.{name}' if self.path else name
-        return None if node is None else _Section(node, self.file, path)
-
-    def number(self, name: str, limits: Quantity) -> float | None:
-        """The value under a name, in the unit of its limits."""
-        node = self.nodes.get(name)
-        if node is None:
-            return None
-        full = f'{self.path}.{name}'
-        text = node.value if isinstance(node, yaml.ScalarNode) else yaml.serialize(node).strip()
-        value = number_in(text, limits.unit) if isinstance(node, yaml.ScalarNode) else None
-        try:
-            return limits.check(full, text if value is None else value)
-        except ParameterError as error:
-            units = units_of(limits.unit)
-            hint = f', in {units}' if value is None and units else ''
-            raise MachineFileError(
-                f'{self.file}, line {node.start_mark.line + 1}: {str(error).rstrip(".")}{hint}.'
-            ) from None
-
-    def numbers(self, table: Mapping[str, Quantity]) -> dict[str, float]:
-        found = {name: self.number(name, limits) for name, limits in table.items()}
-        return {name: value for name, value in found.items() if value is not None}
-
-    def errors(self, values: Mapping[str, float], table: Mapping[str, Quantity]) -> dict[str, float]:
-        """Relative standard errors, given relative (`2 %`) or in the unit of the value."""
-        section = self.section('errors')
-        if section is None:
-            return {}
-        section.only(*values)
-        found = {}
-        for name, node in section.nodes.items():
-            if isinstance(node, yaml.ScalarNode) and node.value.rstrip().endswith('%'):
-                relative = section.number(name, Quantity('standard error', high=10.0))
-            else:
-                limits = replace(table[name], low=0.0, high=1e300, exclusive=False)
-                relative = (section.number(name, limits) or 0.0) / (abs(values[name]) or 1.0)
-            found[name] = relative or 0.0
-        return found
-
-    def items(self, name: str) -> Iterator[_Section]:
-        node = self.nodes.get(name)
-        if not isinstance(node, yaml.SequenceNode) or not node.value:
-            raise self.refused(f'{name} must be a list with an entry for each', node)
-        for k, entry in enumerate(node.value):
-            yield _Section(entry, self.file, f'{self.path}.{name}[{k}]')
-
-
-def _description(top: _Section, name: str) -> MachineDescription:
+def _description(top: Section, name: str) -> MachineDescription:
     top.only(*_SECTIONS)
-    bodies: dict[str, Any] = {}
-    uncertainty = Uncertainty()
+    machine: dict[str, Any] = {}
+    known = Uncertainty()
     for part in ('tool', 'workpiece'):
         section = top.section(part)
         if section is not None:
-            bodies[part], uncertainty = _body(section, part, uncertainty)
-    bearing, material = top.section('bearing'), top.section('material')
-    spindle, cut = top.section('spindle'), top.section('cut')
-    cut_values: dict[str, Any] = {}
-    if bearing is None and 'workpiece' in bodies:
-        cut_values['bearing_contact'] = BearingContact.NONE
-    if bearing is not None:
-        bearing.only(*_BEARING, 'contact')
-        found = bearing.numbers(_BEARING)
-        if 'stiffness' in found:
-            bodies['bearing_stiffness'] = found['stiffness']
-        if 'clearance' in found:
-            cut_values['bearing_clearance'] = found['clearance']
-        contact = bearing.nodes.get('contact')
-        if contact is not None:
-            words = [choice.value for choice in BearingContact]
-            if contact.value not in words:
-                raise bearing.refused(
-                    f'contact is {contact.value!r}: it must be one of {", ".join(words)}', contact
-                )
-            cut_values['bearing_contact'] = contact.value
+            machine[part], known = _body(section, part, known)
+    on_bearing, cut = _bearing(top.section('bearing'))
+    if on_bearing is None and 'workpiece' in machine:
+        cut['bearing_contact'] = BearingContact.NONE
+    machine |= on_bearing or {}
+    material = top.section('material')
     if material is not None:
         material.only(*_MATERIAL, 'errors')
-        found = material.numbers(_MATERIAL)
-        bodies |= found
-        for known, error in material.errors(found, _MATERIAL).items():
-            uncertainty = uncertainty.with_error(known, error)
-    limits: dict[str, float] = {}
-    if spindle is not None:
-        spindle.only(*_SPINDLE)
-        limits = spindle.numbers(_SPINDLE)
-        slow, fast = limits.get('slowest_speed', 0.0), limits.get('fastest_speed', _SPEED.high)
-        if not slow < fast:
-            raise spindle.refused(
-                f'fastest_speed is {fast:g} rev/min: it must be above slowest_speed, {slow:g}'
-            )
-        if 'acceleration' in limits:
-            limits['spindle_acceleration'] = limits.pop('acceleration')
-    if cut is not None:
-        cut.only(*_CUT)
-        found = cut.numbers(_CUT)
-        speed = found.get('spindle_speed', Cut().spindle_speed_rpm)
-        cut_values['spindle_speed_rpm'] = speed
-        if 'depth_of_cut' in found:
-            cut_values['depth_of_cut'] = found['depth_of_cut']
-        if 'feed' in found:
-            cut_values['feed_speed'] = found['feed'] * speed / 60.0
+        machine |= material.numbers(_MATERIAL)
+        for figure, error in material.errors(machine, _MATERIAL).items():
+            known = known.with_error(figure, error)
+    cut |= _cut(top.section('cut'))
     try:
-        machine, default_cut = Machine(**bodies), Cut(**cut_values)
+        made, usual = Machine(**machine), Cut(**cut)
     except ParameterError as error:
         raise top.refused(str(error).rstrip('.')) from None
-    return MachineDescription(
-        machine, default_cut, **limits, uncertainty=uncertainty or None, name=name
-    )
+    spindle = _spindle(top.section('spindle'))
+    return MachineDescription(made, usual, **spindle, uncertainty=known or None, name=name)
 
 
-def _body(section: _Section, part: str, known: Uncertainty) -> tuple[list[Mode], Uncertainty]:
+def _bearing(section: Section | None) -> tuple[dict[str, float] | None, dict[str, Any]]:
+    """What of the machine and what of the cut the bearing gives."""
+    if section is None:
+        return None, {}
+    section.only(*_BEARING, 'contact')
+    found = section.numbers(_BEARING)
+    machine = {'bearing_stiffness': found['stiffness']} if 'stiffness' in found else {}
+    cut: dict[str, Any] = {}
+    if 'clearance' in found:
+        cut['bearing_clearance'] = found['clearance']
+    contact = section.nodes.get('contact')
+    if contact is not None:
+        words = [choice.value for choice in BearingContact]
+        if contact.value not in words:
+            raise section.refused(
+                f'contact is {contact.value!r}: it must be one of {", ".join(words)}', contact
+            )
+        cut['bearing_contact'] = contact.value
+    return machine, cut
+
+
+def _spindle(section: Section | None) -> dict[str, float]:
+    if section is None:
+        return {}
+    section.only(*_SPINDLE)
+    found = section.numbers(_SPINDLE)
+    slow, fast = (found.get(f'{which}_speed', limit) for which, limit in _SPEED_RANGE)
+    if not slow < fast:
+        raise section.refused(
+            f'fastest_speed is {fast:g} rev/min: it must be above slowest_speed, {slow:g} rev/min'
+        )
+    if 'acceleration' in found:
+        found['spindle_acceleration'] = found.pop('acceleration')
+    return found
+
+
+def _cut(section: Section | None) -> dict[str, float]:
+    if section is None:
+        return {}
+    section.only(*_CUT)
+    found = section.numbers(_CUT)
+    speed = found.get('spindle_speed', Cut().spindle_speed_rpm)
+    cut = {'spindle_speed_rpm': speed}
+    if 'depth_of_cut' in found:
+        cut['depth_of_cut'] = found['depth_of_cut']
+    if 'feed' in found:
+        cut['feed_speed'] = found['feed'] * speed / 60.0
+    return cut
+
+
+def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], Uncertainty]:
     """The modes of a body, and what is known of their errors."""
     section.only('modes', 'covariance')
     modes = []
@@ -361,5 +300,3 @@ def _body(section: _Section, part: str, known: Uncertainty) -> tuple[list[Mode],
                 node,
             ) from None
     return modes, known
-
-

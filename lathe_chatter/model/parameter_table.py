@@ -20,6 +20,8 @@ from lathe_chatter.model.units import number_in
 
 Value = bool | int | float | str | list[str]
 Values = Mapping[str, Value]
+Resolved = Mapping[str, Value | None]
+"""What follows from given values: None for a row that has no value then."""
 
 _LARGEST_EXACT_INTEGER = 2**53
 
@@ -111,13 +113,13 @@ class ParameterTable:
 
     Args:
         rows: In the order in which they are declared.
-        derive: Defaults that follow from what was given, as a function of the given values; for
-            instance the bearing's stiffness as half of the workpiece's. May raise ParameterError
-            where given values contradict each other.
+        derive: What follows from what was given, as a function of the given values; for instance
+            the bearing's stiffness as half of the workpiece's. May raise ParameterError where
+            given values contradict each other.
     """
 
     def __init__(
-        self, rows: Iterable[Row], derive: Callable[[Values], Values] = lambda _given: {}
+        self, rows: Iterable[Row], derive: Callable[[Values], Resolved] = lambda _given: {}
     ) -> None:
         """Index the rows."""
         self._rows = {row.name: row for row in rows}
@@ -133,7 +135,9 @@ class ParameterTable:
         return self._rows[name]
 
     def complete(self, given: Mapping[str, object]) -> dict[str, Value]:
-        """The value of every row at the start: what was given, and defaults for the rest.
+        """The value of every row at the start: what was given or follows from it, else defaults.
+
+        A row that has no value beside what was given is left out.
 
         Raises:
             ParameterError: For the first given value, in order of the rows, that is not allowed,
@@ -141,7 +145,8 @@ class ParameterTable:
         """
         checked = {row.name: row.check(given[row.name]) for row in self if row.name in given}
         defaults = {row.name: row.default for row in self}
-        return {**defaults, **self._derive(checked), **checked}
+        found = {**defaults, **checked, **self._derive(checked)}
+        return {name: value for name, value in found.items() if value is not None}
 
     def markdown(self) -> str:
         """The rows as the table of a README."""

@@ -10,36 +10,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from enum import Enum
 from typing import Any, Protocol, TypeVar
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model.cut import Cut
 from lathe_chatter.model.lathe_setup import SEED, LatheSetup
-from lathe_chatter.model.machine import Machine
-from lathe_chatter.model.parameter_table import ParameterTable, Row, Values, rows_of
+from lathe_chatter.model.machine import Body, Machine, Structure
+from lathe_chatter.model.machine_file import MachineDescription, load_machine
+from lathe_chatter.model.parameter_table import ParameterTable, Resolved, Row, Values, rows_of
 from lathe_chatter.model.quantities import Quantity, limits_of
 
 T = TypeVar('T')
 
 
 def cut_from(values: Mapping[str, Any]) -> Cut:
-    """The cut that parameters describe; what they leave out has its default.
+    """The cut that parameters describe; what they leave out is the machine file's, or default.
 
     Raises:
         ParameterError: If a value is not allowed.
+        MachineFileError: If the parameter `machine` is no machine.
     """
-    return _made_like(Cut(), values)
+    described = described_by(values)
+    return _made_like(described.cut if described else Cut(), values, complete=bool(described))
 
 
 def machine_from(values: Mapping[str, Any]) -> Machine:
-    """The machine that parameters describe; what they leave out has its default.
+    """The machine that parameters describe; what they leave out is the machine file's, or default.
 
     Raises:
-        ParameterError: If a value is not allowed.
+        ParameterError: If a value is not allowed, or names the one mode of a body that has more.
+        MachineFileError: If the parameter `machine` is no machine.
     """
-    return _made_like(Machine(), values)
+    described = described_by(values)
+    if described is None:
+        return _made_like(Machine(), values)
+    for row in MACHINE_ROWS:
+        part = row.name.rpartition('.')[0]
+        if part and row.name in values and len(getattr(described.machine, part).modes) > 1:
+            allowed = f'left to the machine file, in which the {part} has several modes'
+            raise ParameterError(row.name, values[row.name], row.unit, allowed)
+    return _made_like(described.machine, values, complete=True)
 
 
 def setup_from(values: Mapping[str, Any]) -> LatheSetup:
@@ -47,9 +59,23 @@ def setup_from(values: Mapping[str, Any]) -> LatheSetup:
 
     Raises:
         ParameterError: If a value is not allowed.
+        MachineFileError: If the parameter `machine` is no machine.
     """
     own = {row.name: values[row.name] for row in SETUP_ROWS if row.name in values}
+    described = described_by(values)
+    if described is not None:
+        own.setdefault('spindle_acceleration', described.spindle_acceleration)
     return LatheSetup(machine_from(values), **own)
+
+
+def described_by(values: Mapping[str, Any]) -> MachineDescription | None:
+    """What the machine file among some parameters holds, None where there is none.
+
+    Raises:
+        MachineFileError: If the parameter `machine` is no machine.
+    """
+    source = values.get(MACHINE_FILE.name)
+    return load_machine(source) if source else None
 
 
 class HasParameters(Protocol):
@@ -65,15 +91,30 @@ class HasParameters(Protocol):
 
 
 def parameters_of(lathe: HasParameters) -> dict[str, Any]:
-    """The parameters of a lathe as it stands, by name, with plain values."""
+    """The parameters of a lathe as it stands, by name, with plain values.
+
+    A machine that takes more than these names to tell is there as the text of its file, under
+    `machine`, without the names that it has no single value for.
+    """
     setup, found = lathe.setup, dict[str, Any]()
+    bodies = (setup.machine.tool, setup.machine.workpiece)
+    if any(_needs_file(body) for body in bodies):
+        found[MACHINE_FILE.name] = MachineDescription(setup.machine, lathe.cut).text()
     for owner, rows in ((lathe.cut, CUT_ROWS), (setup.machine, MACHINE_ROWS), (setup, SETUP_ROWS)):
         for row in rows:
             value: Any = owner
-            for part in row.name.split('.'):
+            *parts, name = row.name.split('.')
+            for part in parts:
                 value = getattr(value, part)
-            found[row.name] = value.value if isinstance(value, Enum) else value
+            if not isinstance(value, Structure):
+                value = getattr(value, name)
+                found[row.name] = value.value if isinstance(value, Enum) else value
     return found
+
+
+def _needs_file(body: Body) -> bool:
+    mode = body.modes[0]
+    return len(body.modes) > 1 or (mode.chip, mode.force, mode.bearing) != (1.0, 1.0, 1.0)
 
 
 def samples_per_tick(sample_rate: float, tick_rate: float) -> int:
@@ -94,28 +135,64 @@ def samples_per_tick(sample_rate: float, tick_rate: float) -> int:
     return count
 
 
-def derived_machine(given: Values) -> Values:
-    """Without a stiffness of its own the bearing has the paper's, k_bc = 0.5 k_wp."""
-    return {'bearing_stiffness': machine_from(given).bearing_stiffness}
+def derived_machine(given: Values) -> Resolved:
+    """What follows from the parameters of a machine that were given.
+
+    Without a stiffness of its own the bearing has the paper's, k_bc = 0.5 k_wp. With a machine
+    file its text, so that a record and a monitor have it too, and all that it says; the names
+    that it has no single value for are None.
+    """
+    machine = machine_from(given)
+    described = described_by(given)
+    if described is None:
+        return {'bearing_stiffness': machine.bearing_stiffness}
+    found: dict[str, Any] = dict.fromkeys(row.name for row in MACHINE_ROWS)
+    described = replace(described, machine=machine)
+    found |= parameters_of(_Described(LatheSetup(machine), described.cut))
+    found = {name: found[name] for name in found if name in {row.name for row in MACHINE_ROWS}}
+    return {**found, MACHINE_FILE.name: described.text()}
 
 
-def _derived_lathe(given: Values) -> Values:
-    """The machine's derived values, once the two rates are known to agree."""
+@dataclass(frozen=True)
+class _Described:
+    """A machine as `parameters_of` takes it."""
+
+    setup: LatheSetup
+    cut: Cut
+
+
+def _derived_lathe(given: Values) -> Resolved:
+    """The machine's and the cut's derived values, once the two rates are known to agree."""
     rates = [float(given.get(name, LATHE[name].default)) for name in ('sample_rate', 'tick_rate')]  # type: ignore[arg-type]  # checked numbers
     samples_per_tick(*rates)
-    return derived_machine(given)
+    if not given.get(MACHINE_FILE.name):
+        return derived_machine(given)
+    setup, cut = setup_from(given), cut_from(given)
+    found = parameters_of(_Described(setup, cut))
+    changing = {row.name: found[row.name] for row in CUT_ROWS}
+    acceleration = setup.spindle_acceleration
+    return {**derived_machine(given), **changing, 'spindle_acceleration': acceleration}
 
 
-def _made_like(usual: T, values: Mapping[str, Any], prefix: str = '') -> T:
-    """A value of the model with the fields that are named, and defaults for the others."""
+def _made_like(
+    usual: T, values: Mapping[str, Any], prefix: str = '', *, complete: bool = False
+) -> T:
+    """A value of the model with the fields that are named.
+
+    Args:
+        usual: Where the others come from.
+        values: By name.
+        prefix: Of the names.
+        complete: Whether the others are as in `usual`, and not as by default.
+    """
     given: dict[str, Any] = {}
     for entry in fields(usual):  # type: ignore[arg-type]  # a dataclass
         name, default = prefix + entry.name, getattr(usual, entry.name)
         if is_dataclass(default):
-            given[entry.name] = _made_like(default, values, f'{name}.')
+            given[entry.name] = _made_like(default, values, f'{name}.', complete=complete)
         elif name in values:
             given[entry.name] = values[name]
-        elif entry.default is MISSING and entry.default_factory is MISSING:
+        elif complete or (entry.default is MISSING and entry.default_factory is MISSING):
             given[entry.name] = default
     try:
         return type(usual)(**given)
@@ -130,6 +207,13 @@ def _setup_row(name: str) -> Row:
     return Row(name, getattr(LatheSetup(), name), limits.meaning, limits)
 
 
+MACHINE_FILE = Row(
+    'machine',
+    '',
+    'machine file: its path, the name of one that is shipped, or its text; parameters given '
+    'beside it win',
+)
+"""For machines that take more than one mode to tell, and for all others."""
 CUT_ROWS = tuple(rows_of(Cut(), run_time=True))
 """Of the cut: what may change at run time."""
 MACHINE_ROWS = tuple(rows_of(Machine()))
@@ -159,6 +243,7 @@ LATHE = ParameterTable(
             node_only=True,
         ),
         _LEAVES_CUT,
+        MACHINE_FILE,
         *MACHINE_ROWS,
         _ACCELERATION,
         Row(

@@ -14,7 +14,7 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model.machine import Body, Machine, Mode
+from lathe_chatter.model.machine import Body, Machine, Structure
 
 MODAL = ('frequency', 'damping_ratio', 'stiffness')
 """The figures of a mode, in the order of a covariance."""
@@ -62,7 +62,9 @@ class Uncertainty:
             raise ValueError
         if np.linalg.eigvalsh(covariance).min() < -1e-9 * max(np.trace(covariance), 1e-300):
             raise ValueError
-        return self._with(tuple(n for k in range(modes) for n in _modal_names(part, k)), covariance)
+        return self._with(
+            tuple(n for k in range(modes) for n in _modal_names(part, k)), covariance
+        )
 
     def _with(self, names: tuple[str, ...], block: Array) -> Uncertainty:
         stay = [k for k, name in enumerate(self.names) if name not in names]
@@ -111,7 +113,7 @@ class Uncertainty:
     def _moved(self, machine: Machine, deviations: Array) -> Machine:
         factor = dict(zip(self.names, np.exp(deviations).tolist(), strict=True))
 
-        def moved(part: str, body: Body) -> tuple[Mode, ...]:
+        def moved(part: str, body: Body) -> Body:
             made = []
             for k, mode in enumerate(body.modes):
                 f, z, stiffness = (factor.get(n, 1.0) for n in _modal_names(part, k))
@@ -123,7 +125,7 @@ class Uncertainty:
                         mass=mode.mass * stiffness / f**2,
                     )
                 )
-            return tuple(made)
+            return made[0] if len(made) == 1 else Structure(tuple(made))
 
         return replace(
             machine,
@@ -155,9 +157,7 @@ def uncertainty_from(text: str, machine: Machine) -> Uncertainty:
         elif name in short:
             modal[MODAL[short[name]]] = error
         else:
-            raise ParameterError(
-                '--uncertain', name, '', 'of frequency, damping, stiffness and C'
-            )
+            raise ParameterError('--uncertain', name, '', 'of frequency, damping, stiffness and C')
     for part in ('tool', 'workpiece'):
         for k in range(len(getattr(machine, part).modes)):
             known = known.with_mode(part, k, modal)

@@ -10,8 +10,14 @@ from enum import Enum
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut
-from lathe_chatter.model.parameter_table import ParameterTable, Row, Values
-from lathe_chatter.model.parameters import LATHE, MACHINE_ROWS, derived_machine
+from lathe_chatter.model.parameter_table import ParameterTable, Resolved, Row, Values
+from lathe_chatter.model.parameters import (
+    LATHE,
+    MACHINE_FILE,
+    MACHINE_ROWS,
+    derived_machine,
+    described_by,
+)
 from lathe_chatter.model.quantities import Quantity, limits_of
 
 __all__ = ['LATHE', 'MONITOR', 'RECORDER', 'ModelSource']
@@ -20,13 +26,16 @@ _SPEED_RANGE = ('slowest_speed', 'fastest_speed')
 _ADVISED = limits_of(Cut, 'spindle_speed_rpm')
 
 
-def _derived_monitor(given: Values) -> Values:
+def _derived_monitor(given: Values) -> Resolved:
     """The machine's derived values, once the range of speeds is one."""
-    slowest, fastest = (float(given.get(n, MONITOR[n].default)) for n in _SPEED_RANGE)  # type: ignore[arg-type]  # checked numbers
+    described = described_by(given)
+    usual = {name: getattr(described, name, MONITOR[name].default) for name in _SPEED_RANGE}
+    spindle = {name: float(given.get(name, usual[name])) for name in _SPEED_RANGE}  # type: ignore[arg-type]  # checked numbers
+    slowest, fastest = spindle.values()
     if slowest >= fastest:
         allowed = f'above slowest_speed, which is {slowest:g} rev/min'
         raise ParameterError('fastest_speed', fastest, 'rev/min', allowed)
-    return derived_machine(given)
+    return {**derived_machine(given), **spindle}
 
 
 class ModelSource(str, Enum):
@@ -45,6 +54,7 @@ MONITOR = ParameterTable(
             (ModelSource.__doc__ or '').rstrip('.'),
             choices=ModelSource,
         ),
+        MACHINE_FILE,
         *MACHINE_ROWS,
         Row('slowest_speed', 60.0, 'slowest spindle speed to recommend', _ADVISED),
         Row('fastest_speed', 30000.0, 'fastest spindle speed to recommend', _ADVISED),

@@ -11,9 +11,9 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.parameters import MACHINE_ROWS, machine_from
+from lathe_chatter.model.parameters import MACHINE_FILE, MACHINE_ROWS, machine_from
 
 _SETTLING = 1.0
 """s from when this node has found the services of another to when the other has found it too: an
@@ -22,7 +22,7 @@ _UNKNOWN = '_UNKNOWN_'
 """In the name of a node of which the graph has a publisher before it has the name."""
 _PATIENCE = 1.0
 """s after which an unanswered node is asked again: on a busy machine answers may be lost."""
-_MACHINE = [row.name for row in MACHINE_ROWS]
+_MACHINE = [MACHINE_FILE.name, *(row.name for row in MACHINE_ROWS)]
 
 Answer = Callable[[str, dict[str, Any]], None]
 """Takes the name of a node and its parameters; one that it does not have is None."""
@@ -138,11 +138,12 @@ class RemoteMachine:
         self._parameters.look()
 
     def _take(self, _name: str, values: dict[str, Any]) -> None:
-        doubles = {name: value for name, value in values.items() if isinstance(value, float)}
-        lacking = [name for name in _MACHINE if name not in doubles]
+        known = {name: value for name, value in values.items() if value is not None}
+        described = bool(known.get(MACHINE_FILE.name))
+        lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in known]
         try:
-            machine = machine_from(doubles)
-        except ParameterError as error:
+            machine = machine_from(known)
+        except LatheChatterError as error:
             self._complain(str(error))
         else:
             if lacking:

@@ -95,8 +95,8 @@ class FrequencyResponse:
     @property
     def of_receptance(self) -> Complex:
         """What a receptance is multiplied by to give what was measured: (i omega)^order (n,)."""
-        factor: Complex = (2j * np.pi * self.frequency) ** ORDERS[self.form]
-        return factor
+        factor = (2j * np.pi * self.frequency) ** ORDERS[self.form]
+        return factor.astype(np.complex128)
 
 
 def read_frequency_responses(path: Path | str) -> list[FrequencyResponse]:
@@ -162,7 +162,7 @@ def _universal(path: Path) -> Iterator[FrequencyResponse]:
         coherence = None if beside is None else np.clip(np.real(beside['data']), 0.0, 1.0)
         yield FrequencyResponse(
             np.asarray(entry['x'], float),
-            np.asarray(entry['data'], complex) * scale,
+            (np.asarray(entry['data']) * scale).astype(np.complex128),
             form,
             coherence,
             str(path),
@@ -235,7 +235,8 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
     if units['frequency'] == 'rad/s':
         frequency = frequency / (2.0 * np.pi)
     coherence = table[:, columns['coherence']] if 'coherence' in columns else None
-    yield FrequencyResponse(frequency, response * scale, form, coherence, str(path))
+    measured = (response * scale).astype(np.complex128)
+    yield FrequencyResponse(frequency, measured, form, coherence, str(path))
 
 
 _COLUMNS = ('frequency', 'real', 'imaginary', 'magnitude', 'phase', 'coherence')

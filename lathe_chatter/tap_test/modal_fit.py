@@ -293,7 +293,8 @@ class _Fit:
             frequency = math.exp(parameters[3 * k]) / (2.0 * math.pi)
             values = (frequency, *np.exp(parameters[3 * k + 1 : 3 * k + 3]))
             spread = np.sqrt(np.diag(covariance)[3 * place : 3 * place + 3])
-            errors = tuple(float(v * s) for v, s in zip(values, spread, strict=True))
+            f, z, stiffness = (float(v * s) for v, s in zip(values, spread, strict=True))
+            errors = (f, z, stiffness)
             modes.append(FittedMode(values[0], float(values[1]), float(values[2]), errors))
         found = tuple(modes)
         return ModalFit(

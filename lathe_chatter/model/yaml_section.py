@@ -1,0 +1,96 @@
+"""A mapping of a YAML file whose entries know their lines: a mistake is named with its line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import yaml
+
+from lathe_chatter.errors import MachineFileError, ParameterError, nearest_name
+from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.units import number_in, units_of
+
+
+class Section:
+    """A mapping of a YAML file whose entries know their lines."""
+
+    def __init__(self, node: yaml.Node | None, file: str, path: str) -> None:
+        """Take the mapping at a path (`tool.modes[0]`) of a file, or refuse what is none."""
+        self.file, self.path = file, path
+        self.line = node.start_mark.line + 1 if node is not None else 1
+        if not isinstance(node, yaml.MappingNode):
+            raise self.refused('it must be a mapping of names to values')
+        self.nodes: dict[str, yaml.Node] = {}
+        for key, value in node.value:
+            if key.value in self.nodes:
+                raise self.refused(f'{key.value!r} stands there twice', key)
+            self.nodes[key.value] = value
+
+    def refused(self, text: str, node: yaml.Node | None = None) -> MachineFileError:
+        """The error that says what is wrong, at a node or at the whole section."""
+        line = node.start_mark.line + 1 if node is not None else self.line
+        where = f'{self.path}: ' if self.path else ''
+        return MachineFileError(f'{self.file}, line {line}: {where}{text}.')
+
+    def only(self, *known: str) -> None:
+        """Refuse a name that would otherwise be ignored in silence."""
+        for key, node in self.nodes.items():
+            if key not in known:
+                near = nearest_name(key, known)
+                hint = f'did you mean {near}?' if near else f'known are {", ".join(known)}'
+                raise self.refused(f'there is no {key!r}: {hint}'.removesuffix('?'), node)
+
+    def section(self, name: str) -> Section | None:
+        """The mapping under a name, None where there is none."""
+        node = self.nodes.get(name)
+        path = f'{self.path}.{name}' if self.path else name
+        return None if node is None else Section(node, self.file, path)
+
+    def number(self, name: str, limits: Quantity) -> float | None:
+        """The value under a name, in the unit of its limits."""
+        node = self.nodes.get(name)
+        if node is None:
+            return None
+        full = f'{self.path}.{name}'
+        text = node.value if isinstance(node, yaml.ScalarNode) else yaml.serialize(node).strip()
+        value = number_in(text, limits.unit) if isinstance(node, yaml.ScalarNode) else None
+        try:
+            return limits.check(full, text if value is None else value)
+        except ParameterError as error:
+            units = units_of(limits.unit)
+            hint = f', in {units}' if value is None and units else ''
+            raise MachineFileError(
+                f'{self.file}, line {node.start_mark.line + 1}: {str(error).rstrip(".")}{hint}.'
+            ) from None
+
+    def numbers(self, table: Mapping[str, Quantity]) -> dict[str, float]:
+        """Those values of a table that are there."""
+        found = {name: self.number(name, limits) for name, limits in table.items()}
+        return {name: value for name, value in found.items() if value is not None}
+
+    def errors(
+        self, values: Mapping[str, float], table: Mapping[str, Quantity]
+    ) -> dict[str, float]:
+        """Relative standard errors, given relative (`2 %`) or in the unit of the value."""
+        section = self.section('errors')
+        if section is None:
+            return {}
+        section.only(*values)
+        found = {}
+        for name, node in section.nodes.items():
+            if isinstance(node, yaml.ScalarNode) and node.value.rstrip().endswith('%'):
+                relative = section.number(name, Quantity('standard error', high=10.0))
+            else:
+                limits = replace(table[name], low=0.0, high=1e300, exclusive=False)
+                relative = (section.number(name, limits) or 0.0) / (abs(values[name]) or 1.0)
+            found[name] = relative or 0.0
+        return found
+
+    def items(self, name: str) -> Iterator[Section]:
+        """The mappings of the list under a name, which must not be empty."""
+        node = self.nodes.get(name)
+        if not isinstance(node, yaml.SequenceNode) or not node.value:
+            raise self.refused(f'{name} must be a list with an entry for each', node)
+        for k, entry in enumerate(node.value):
+            yield Section(entry, self.file, f'{self.path}.{name}[{k}]')

@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lathe_chatter.errors import MachineFileError, ParameterError
+from lathe_chatter.lathe.config import config_from
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.machine_file import load_machine, shipped_machines
+from lathe_chatter.model.parameters import LATHE, machine_from
+from lathe_chatter.model.uncertainty import uncertainty_from
+
+SHAFT = """
+tool:
+  modes:
+    - {frequency: 312 Hz, damping_ratio: 3 %, stiffness: 21 N/um}
+workpiece:
+  modes:
+    - {frequency: 754 rad/s, damping_ratio: 0.03, mass: 20 kg}
+    - {frequency: 480, damping_ratio: 0.02, mass: 8, bearing: -0.8}
+bearing: {stiffness: 5.0e7, clearance: 12 um, contact: seated}
+material: {cutting_coefficient: 1500 MPa}
+spindle: {slowest_speed: 60 rpm, fastest_speed: 3000, acceleration: 500 rpm/s}
+cut: {spindle_speed: 900 rpm, depth_of_cut: 0.5 mm, feed: 0.2 mm/rev}
+"""
+
+
+def test_a_machine_with_units() -> None:
+    found = load_machine(SHAFT)
+    tool, (first, second) = found.machine.tool, found.machine.workpiece.modes
+    assert tool.natural_frequency == pytest.approx(2.0 * math.pi * 312.0, rel=1e-15)
+    assert tool.stiffness == pytest.approx(21e6, rel=1e-14)
+    assert (first.natural_frequency, first.mass) == (754.0, 20.0)
+    assert (second.bearing, second.chip) == (-0.8, 1.0)
+    assert found.machine.bearing_stiffness == 5e7
+    assert found.machine.cutting_coefficient == 1.5e9
+    assert (found.slowest_speed, found.fastest_speed) == (60.0, 3000.0)
+    assert found.spindle_acceleration == 500.0
+    assert found.cut.bearing_clearance == 12e-6
+    assert found.cut.bearing_contact is BearingContact.SEATED
+    assert found.cut.depth_of_cut == 5e-4
+    assert found.cut.feed == pytest.approx(2e-4, rel=1e-15)
+
+
+def test_the_shipped_paper_is_the_paper() -> None:
+    found = load_machine('paper')
+    assert found.machine == Machine()
+    assert found.cut == Cut()
+
+
+@pytest.mark.parametrize('name', ['paper', 'chucked_shaft', 'boring_bar'])
+def test_what_is_saved_comes_back_to_the_last_bit(name: str, tmp_path: Path) -> None:
+    assert name in shipped_machines()
+    found = load_machine(name)
+    found.save(tmp_path / 'again.yaml')
+    for again in (load_machine(tmp_path / 'again.yaml'), load_machine(found.text())):
+        assert again.machine == found.machine
+        assert again.cut == found.cut
+        assert again.spindle_acceleration == found.spindle_acceleration
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('tool: {modes: [{frequency: 312 kg, damping_ratio: 0.1, mass: 1}]}\n',
+         ('line 1', "tool.modes[0].frequency is '312 kg' Hz", 'rad/s')),
+        ('tool:\n  modes:\n    - {frequency: 3, damping_ratio: 2, mass: 1}\n',
+         ('line 3', 'damping_ratio is 2', 'from 0 to 1')),
+        ('tool: {modes: [{frequency: 3 Hz, damping_ratio: 0.1, mass: 1, stiffness: 3}]}\n',
+         ('either mass or stiffness',)),
+        ('tool: {modes: [{damping_ratio: 0.1, mass: 1}]}\n', ('needs frequency',)),
+        ('tool: {modes: []}\n', ('modes must be a list',)),
+        ('tol: {}\n', ("no 'tol'", 'tool')),
+        ('\n\nbearing: {contact: both}\n', ('line 3', "contact is 'both'", 'seated')),
+        ('spindle: {slowest_speed: 3000, fastest_speed: 60}\n', ('fastest_speed is 60',)),
+        ('cut: {depth_of_cut: 1 kg}\n', ('depth_of_cut', 'mm')),
+        ('cut: {feed: [1, 2]}\n', ('cut.feed',)),
+        ('tool: [\n', ('line',)),
+        ('- 1\n', ('mapping',)),
+        ('tool: {modes: [{frequency: 3, damping_ratio: 0.1, mass: 1}], covariance: [[1]]}\n',
+         ('covariance', '3 x 3')),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_sentence_with_its_line(text: str, said: tuple[str, ...]) -> None:
+    with pytest.raises(MachineFileError) as mistake:
+        load_machine(text)
+    for part in said:
+        assert part in str(mistake.value)
+    assert '\n' not in str(mistake.value)
+
+
+def test_a_file_that_is_not_there_names_those_that_are() -> None:
+    with pytest.raises(MachineFileError, match='chucked_shaft'):
+        load_machine('nowhere.yaml')
+
+
+def test_a_lathe_and_its_record_have_the_machine_of_a_file(tmp_path: Path) -> None:
+    file = tmp_path / 'shaft.yaml'
+    file.write_text(SHAFT)
+    config = config_from({'machine': str(file), 'depth_of_cut': 1e-4})
+    assert config.machine == load_machine(file).machine
+    assert config.cut.depth_of_cut == 1e-4
+    assert config.cut.spindle_speed_rpm == 900.0
+    assert config.setup.spindle_acceleration == 500.0
+    file.unlink()  # what is recorded is the machine, and not where it stood
+    again = config_from(config.parameters())
+    assert again == config
+
+
+def test_what_is_given_beside_the_file_wins() -> None:
+    config = config_from({'machine': SHAFT, 'tool.mass': 3.0, 'cutting_coefficient': 2e9})
+    assert config.machine.tool.mass == 3.0
+    assert config.machine.cutting_coefficient == 2e9
+    with pytest.raises(ParameterError, match=r'workpiece.mass.*several modes'):
+        machine_from({'machine': SHAFT, 'workpiece.mass': 3.0})
+
+
+def test_a_node_has_the_text_of_its_machine_and_no_false_modes(tmp_path: Path) -> None:
+    file = tmp_path / 'shaft.yaml'
+    file.write_text(SHAFT)
+    values = LATHE.complete({'machine': str(file)})
+    assert load_machine(str(values['machine'])).machine == load_machine(file).machine
+    assert 'workpiece.mass' not in values
+    assert values['tool.damping_ratio'] == 0.03
+    assert values['spindle_speed_rpm'] == 900.0
+    assert LATHE.complete(values) == values
+
+
+ERRORS = """
+tool:
+  modes:
+    - {frequency: 300 Hz, damping_ratio: 0.03, mass: 2 kg,
+       errors: {frequency: 3 Hz, damping_ratio: 20 %, mass: 5 %}}
+material: {cutting_coefficient: 1500 MPa, errors: {cutting_coefficient: 150 MPa}}
+"""
+
+
+def test_errors_are_relative_and_a_mass_becomes_a_stiffness() -> None:
+    known = load_machine(ERRORS).uncertainty
+    assert known is not None
+    assert known.error_of('tool.modes[0].frequency') == pytest.approx(0.01)
+    assert known.error_of('tool.modes[0].damping_ratio') == pytest.approx(0.2)
+    assert known.error_of('tool.modes[0].stiffness') == pytest.approx(math.hypot(0.05, 0.02))
+    assert known.error_of('cutting_coefficient') == pytest.approx(0.1)
+    again = load_machine(load_machine(ERRORS).text()).uncertainty
+    assert again is not None
+    assert again.error_of('tool.modes[0].stiffness') == pytest.approx(math.hypot(0.05, 0.02))
+
+
+def test_drawn_machines_scatter_as_they_are_told() -> None:
+    found = load_machine(ERRORS)
+    assert found.uncertainty is not None
+    machines, _ = found.uncertainty.draw(found.machine, 4000, seed=3)
+    mass = np.log([machine.tool.mass for machine in machines])
+    frequency = np.log([machine.tool.natural_frequency for machine in machines])
+    assert mass.std() == pytest.approx(0.05, rel=0.05)
+    assert frequency.std() == pytest.approx(0.01, rel=0.05)
+    assert abs(np.corrcoef(mass, frequency)[0, 1]) < 0.06
+
+
+def test_uncertainty_in_short() -> None:
+    known = uncertainty_from('frequency=2%, damping=20%,C=15%', Machine())
+    assert known.error_of('workpiece.modes[0].frequency') == pytest.approx(0.02)
+    assert known.error_of('tool.modes[0].damping_ratio') == pytest.approx(0.2)
+    assert known.error_of('cutting_coefficient') == pytest.approx(0.15)
+    for wrong in ('speed=2%', 'frequency=two', 'frequency=-1%'):
+        with pytest.raises(ParameterError, match='--uncertain'):
+            uncertainty_from(wrong, Machine())
