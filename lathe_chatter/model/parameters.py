@@ -98,8 +98,9 @@ def parameters_of(lathe: HasParameters) -> dict[str, Any]:
     """
     setup, found = lathe.setup, dict[str, Any]()
     bodies = (setup.machine.tool, setup.machine.workpiece)
-    if any(_needs_file(body) for body in bodies):
-        found[MACHINE_FILE.name] = MachineDescription(setup.machine, lathe.cut).text()
+    described = any(_needs_file(body) for body in bodies)
+    text = MachineDescription(setup.machine, lathe.cut).text() if described else ''
+    found[MACHINE_FILE.name] = text
     for owner, rows in ((lathe.cut, CUT_ROWS), (setup.machine, MACHINE_ROWS), (setup, SETUP_ROWS)):
         for row in rows:
             value: Any = owner
