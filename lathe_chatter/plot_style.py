@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -24,7 +22,6 @@ ALARM_TEXT = '#8a3c66'
 KNOCK = '#8A6D00'
 OPEN, SEATED, LINE, SAFE = '#0072B2', '#D55E00', '#000000', '#009E73'
 _PREFIXES = {-4: 'p', -3: 'n', -2: 'µ', -1: 'm', 0: '', 1: 'k', 2: 'M', 3: 'G', 4: 'T'}
-_BINS = 1500
 _DPI = 110
 
 
@@ -91,17 +88,20 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(path.with_suffix('.svg'), metadata={'Date': None, 'Creator': None})
 
 
-def envelope(axes: Axes, time: Array, value: Array, colour: str, label: str = '') -> None:
-    """A long signal as the band between its smallest and largest values, never as 10^6 points.
+def widen(axes: Axes, *, x: float = 0.0, y: float = 0.0) -> None:
+    """Give the axes at least so much to each side of their middle, and plain numbers.
 
-    A short one is drawn as it is.
+    What has come to rest else fills them with its rounding, and is labelled by differences from
+    a number of ten digits.
     """
-    if len(value) <= 2 * _BINS:
-        axes.plot(time, value, color=colour, lw=0.8, label=label)
-        return
-    edges = np.linspace(0, len(value), _BINS + 1).astype(int)[:-1]
-    low, high = np.minimum.reduceat(value, edges), np.maximum.reduceat(value, edges)
-    axes.fill_between(time[edges], low, high, color=colour, lw=0.4, label=label)
+    for limits, setter, least in (
+        (axes.get_xlim(), axes.set_xlim, x),
+        (axes.get_ylim(), axes.set_ylim, y),
+    ):
+        middle, half = 0.5 * sum(limits), 0.5 * (limits[1] - limits[0])
+        if half < least:
+            setter(middle - least, middle + least)
+    axes.ticklabel_format(useOffset=False)
 
 
 def grid(axes: Axes) -> None:

@@ -59,21 +59,20 @@ class Screen:
         """Print JSON, or leave it out."""
         self._json = json
         self._console = Console(stderr=json, markup=False, emoji=False, highlight=False)
-        # A pipe has no width, unless the user says one.
-        self._has_width = self._console.is_terminal or bool(os.environ.get('COLUMNS'))
+        if not (self._console.is_terminal or os.environ.get('COLUMNS')):
+            self._console.width = _ANY  # a pipe has no width, unless the user says one
 
     def say(self, text: str, style: str = '') -> None:
         """Print text: on a terminal broken between words, in a pipe one line as it is."""
-        if self._has_width:  # the library would break a path that is longer than a line
-            width = max(self._console.width, 1)
-            lines = [
-                textwrap.fill(
-                    line, width, break_long_words=False, break_on_hyphens=False,
-                    subsequent_indent=' ' * (len(line) - len(line.lstrip())),
-                )
-                for line in text.split('\n')
-            ]  # fmt: skip
-            text = '\n'.join(lines)
+        # Not by the library, which would break a path that is longer than a line.
+        lines = [
+            textwrap.fill(
+                line, max(self._console.width, 1), break_long_words=False, break_on_hyphens=False,
+                subsequent_indent=' ' * (len(line) - len(line.lstrip())),
+            )
+            for line in text.split('\n')
+        ]  # fmt: skip
+        text = '\n'.join(lines)
         self._console.print(Text(text, style=style), soft_wrap=True)
 
     def name_file(self, label: str, path: Path) -> None:
@@ -104,16 +103,11 @@ class Screen:
             table.add_row(*map(Text, row))
         if heading:
             self.say(heading)
-        natural = self._console.measure(
-            table, options=self._console.options.update(width=_ANY)
-        ).maximum
-        least = natural - sum(
+        least = self._console.measure(table).maximum - sum(
             _width([title, *cells], whole=True) - _width([title, *cells], whole=kind != 'text')
             for (title, kind), cells in zip(titles.items(), zip(*rows, strict=True), strict=False)
         )
-        if not self._has_width:
-            self._console.print(table, width=max(natural, 1), crop=False)
-        elif least <= self._console.width:
+        if least <= self._console.width:
             self._console.print(table)
         else:
             self._list(list(titles), rows)

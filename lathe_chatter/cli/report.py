@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
 from typing import Any
 
 from lathe_chatter.cli.common_options import add_json, add_run
@@ -20,6 +22,10 @@ HELP = 'print what happened in a recorded run and draw it'
 EXAMPLE = 'lathe-chatter report runs/20260401-120000'
 
 PICTURE = 'report.png'
+_LATE = 1e-3
+"""s after which a record begins that has not the start of the cut."""
+_SAME_SPEED = 0.02
+"""Part by which speeds may differ that are one piece of advice."""
 _ROUNDING = 1e-12
 """m: what moves less has no frequency worth a name."""
 
@@ -56,18 +62,42 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
         'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and '
         'as the rightmost characteristic root has them, of the machine open and on its bearing.'
     )
+    for sentence in _gap_sentences(history):
+        screen.say(sentence)
+    excerpts = excerpts_of(history)
     folder = history.path if history.path.is_dir() else history.path.parent
     picture = folder / PICTURE
     with writing(picture):
-        draw_run(history, picture)
+        draw_run(history, excerpts, picture)
     screen.name_file('run', history.path)
     screen.name_file('picture', picture)
     return {
         'run': history.path,
         'picture': picture,
         'occurrences': occurrences,
-        'moments': [_excerpt_figures(excerpt) for excerpt in excerpts_of(history)],
+        'gaps': [gap for gap in history.samples.gaps if not gap.restart],
+        'restarts': [gap for gap in history.samples.gaps if gap.restart],
+        'moments': [_excerpt_figures(excerpt) for excerpt in excerpts],
     }
+
+
+def _gap_sentences(history: History) -> Iterator[str]:
+    """What the pictures leave out, in words."""
+    missing = [gap for gap in history.samples.gaps if not gap.restart]
+    if missing:
+        longest = max(missing, key=lambda gap: gap.after - gap.before)
+        yield (
+            f'Samples are missing in {_counted(len(missing), "place")}, the longest from '
+            f'{longest.before:.6f} s to {longest.after:.6f} s: lines end there, and nothing is '
+            'computed across them.'
+        )
+    restarts = [gap for gap in history.samples.gaps if gap.restart]
+    if restarts:
+        yield (
+            f'The simulated time went back {_counted(len(restarts), "time")}, first from '
+            f'{restarts[0].before:.6f} s to {restarts[0].after:.6f} s: the lathe started again, '
+            'and the pictures show one cut over the other.'
+        )
 
 
 def _excerpt_figures(excerpt: Excerpt) -> dict[str, Any]:
@@ -92,13 +122,23 @@ def _pair(frequency: float | None, growth_rate: float | None) -> str:
     return f'{frequency:.1f}  {growth_rate:+7.2f}'
 
 
+def _counted(count: int, word: str) -> str:
+    return f'{count} {word}' if count == 1 else f'{count} {word}s'
+
+
 def _occurrences(history: History) -> list[dict[str, Any]]:
-    """Start, changes, flags and end, in order of time."""
-    start = history.start
-    result = [_entry(history, 0.0, f'start: {_cut_text(start)}')]
+    """Start, changes, flags, advice and end, in order of time."""
+    begin = history.begin
+    first = _cut_text(history.cut_at(begin))
+    result = [_entry(history, begin, f'start: {first}' if begin < _LATE else f'begin: {first}')]
     for change in history.changes:
         words = ', '.join(on_the_shop_floor(*changed) for changed in change.new.items())
         result.append(_entry(history, change.time, words))
+    result += [
+        _entry(history, ramp.end, f'the spindle is at {ramp.high:g} rev/min')
+        for ramp in history.ramps
+        if ramp.start < ramp.end <= history.duration
+    ]
     result += [
         _entry(history, knock.time, f'knock, {knock.impulse * 1e3:g} mN s')
         for knock in history.knocks
@@ -108,9 +148,24 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
         if flag.chatter:
             entry |= {'frequency': flag.frequency, 'growth_rate': flag.growth_rate}
         result.append(entry)
+    result += [
+        _entry(history, time, f'advice: {speed:.0f} rev/min') for time, speed in _advice(history)
+    ]
     result.sort(key=lambda entry: float(entry['time']))
     result.append(_entry(history, history.duration, 'end'))
     return result
+
+
+def _advice(history: History) -> Iterator[tuple[float, float]]:
+    """When the monitor recommended which speed, s and rev/min: at first, and where it changed."""
+    recommended = history.estimates.get('recommended_speed_rpm')
+    turns = [flag.time for flag in history.flags]
+    last, last_turn = math.nan, -1
+    for time, speed in () if recommended is None else recommended.T.tolist():
+        turn = bisect.bisect_right(turns, time)
+        if turn != last_turn or not abs(speed / last - 1.0) <= _SAME_SPEED:
+            yield time, speed
+            last, last_turn = speed, turn
 
 
 def _entry(history: History, time: float, what: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.cut_log import read_cut_log
-from lathe_chatter.recording.run import Samples
+from lathe_chatter.report.run_samples import RunSamples
 
+_FLAG = 'chatter'
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 
 
@@ -43,6 +44,15 @@ class Flag:
     growth_rate: float = float('nan')
 
 
+class Ramp(NamedTuple):
+    """The spindle on its way to a speed: from when to when, s, and between which, rev/min."""
+
+    start: float
+    end: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True)
 class History:
     """A run as arrays and occurrences.
@@ -51,37 +61,76 @@ class History:
         path: The folder of the run.
         machine: As it was at the start.
         start: The cut at the start.
-        samples: By name of column (n,), SI.
+        samples: Of the lathe.
         changes: Of the cut, in order.
         knocks: On the tool, in order.
         flags: Of the monitor, in order.
         estimates: Growth rate, frequency and so on by name: simulated times and values (2, m).
         tool_leaves_cut: The force law, see `VirtualLathe`.
+        spindle_acceleration: rev/min per s; 0 where the speed steps.
     """
 
     path: Path
     machine: Machine
     start: Cut
-    samples: dict[str, Array]
+    samples: RunSamples
     changes: list[Change] = field(default_factory=list)
     knocks: list[Knock] = field(default_factory=list)
     flags: list[Flag] = field(default_factory=list)
     estimates: dict[str, Array] = field(default_factory=dict)
     tool_leaves_cut: bool = True
+    spindle_acceleration: float = 0.0
 
     def cut_at(self, time: float) -> Cut:
-        """The cut in force at a simulated time, s."""
+        """The cut in force at a simulated time, s: what is set, and the speed that is reached."""
         values: dict[str, Any] = {}
         for change in self.changes:
             if change.time <= time:
                 values |= change.new
-        return self.start.with_changes(**values)
+        return self.start.with_changes(**{**values, 'spindle_speed_rpm': self.speed_at(time)})
+
+    def speed_at(self, time: float) -> float:
+        """The spindle speed that is reached at a simulated time, rev/min; without its swing."""
+        speed = self.start.spindle_speed_rpm
+        for ramp in self.ramps:
+            if time >= ramp.end:
+                speed = ramp.high
+            elif time >= ramp.start:
+                share = (time - ramp.start) / (ramp.end - ramp.start)
+                speed = ramp.low + share * (ramp.high - ramp.low)
+        return speed
+
+    @property
+    def ramps(self) -> list[Ramp]:
+        """Every change of the spindle speed in order; a step takes no time."""
+        found: list[Ramp] = []
+        for change in self.changes:
+            target = change.new.get('spindle_speed_rpm')
+            if target is None:
+                continue
+            speed = self.start.spindle_speed_rpm
+            if found:
+                last = found[-1]
+                speed = last.high
+                if last.start <= change.time < last.end:  # turned round on its way
+                    share = (change.time - last.start) / (last.end - last.start)
+                    speed = last.low + share * (last.high - last.low)
+                    found[-1] = last._replace(end=change.time, high=speed)
+            taken = 0.0
+            if self.spindle_acceleration:
+                taken = abs(target - speed) / self.spindle_acceleration
+            found.append(Ramp(change.time, change.time + taken, speed, float(target)))
+        return found
+
+    @property
+    def begin(self) -> float:
+        """Simulated time of the first sample, s."""
+        return self.samples.first
 
     @property
     def duration(self) -> float:
         """Simulated time of the last sample, s."""
-        time = self.samples['time']
-        return float(time[-1]) if len(time) else 0.0
+        return self.samples.last
 
     def chatter_spans(self) -> list[tuple[float, float]]:
         """When the flag was up: from and to, s."""
@@ -105,23 +154,42 @@ def read_history(path: Path) -> History:
         RunReadError: If there is no such run, or it has no samples.
     """
     run = read_run(path)
-    samples = run.samples()
-    lathe = _topic(run, '/samples').removesuffix('/samples')
-    log = read_cut_log(run, lathe)
-    estimates = {name: _series(run, samples, f'/{name}') for name in _ESTIMATES}
+    topic = run.samples_topic()
+    samples = RunSamples(lambda: run.sample_blocks(topic))
+    if not samples.count:
+        raise run.without_samples(topic)
+    log = read_cut_log(run, topic.removesuffix('/samples'))
+    figures = _monitor_figures(run)
+    estimates = {
+        name: np.array([samples.simulated_time([at for at, _ in found]), [v for _, v in found]])
+        for name, found in figures.items()
+        if name != _FLAG
+    }
     return History(
         path=Path(path),
         machine=machine_from(log.parameters),
         start=cut_from(log.parameters),
-        samples=samples.columns,
+        samples=samples,
         changes=list(log.changes),
         knocks=[
             each for session in log.sessions for each in session.events if isinstance(each, Knock)
         ],
-        flags=_flags(run, samples, estimates),
+        flags=_flags(samples, figures[_FLAG], estimates),
         estimates=estimates,
         tool_leaves_cut=bool(log.parameters.get('tool_leaves_cut', True)),
+        spindle_acceleration=float(log.parameters.get('spindle_acceleration', 0.0)),
     )
+
+
+def _monitor_figures(run: Run) -> dict[str, list[tuple[int, float]]]:
+    """What the monitor published by name: when it was received, ns, and what; in one pass."""
+    names = (*_ESTIMATES, _FLAG)
+    topics = {_topic(run, f'chatter_monitor/{name}'): name for name in names}
+    topics.pop('', None)
+    found: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
+    for recorded in run.messages(*topics) if topics else ():
+        found[topics[recorded.topic]].append((recorded.log_time, float(recorded.message.data)))
+    return found
 
 
 def _topic(run: Run, ending: str) -> str:
@@ -129,24 +197,17 @@ def _topic(run: Run, ending: str) -> str:
     return next((name for name in sorted(run.topics) if name.endswith(ending)), '')
 
 
-def _series(run: Run, samples: Samples, ending: str) -> Array:
-    """A figure of the monitor over simulated time (2, m)."""
-    topic = _topic(run, f'chatter_monitor{ending}')
-    found = [*run.messages(topic)] if topic else []
-    times = samples.simulated_time([each.log_time for each in found])
-    return np.array([times, [each.message.data for each in found]])
-
-
-def _flags(run: Run, samples: Samples, estimates: Mapping[str, Array]) -> list[Flag]:
+def _flags(
+    samples: RunSamples, published: list[tuple[int, float]], estimates: Mapping[str, Array]
+) -> list[Flag]:
     """Every change of the flag."""
-    topic = _topic(run, 'chatter_monitor/chatter')
     flags: list[Flag] = []
     up = False
-    for recorded in run.messages(topic) if topic else ():
-        if recorded.message.data == up:
+    for received, value in published:
+        if bool(value) == up:
             continue
-        up = recorded.message.data
-        (time,) = samples.simulated_time([recorded.log_time]).tolist()
+        up = bool(value)
+        (time,) = samples.simulated_time([received]).tolist()
         at = {name: value_near(estimates[name], time) for name in ('frequency', 'growth_rate')}
         flags.append(Flag(time, up, **at))
     return flags

@@ -6,6 +6,8 @@ import itertools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.plot_style import ALARM
 from lathe_chatter.report.history import History
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 _MOST_CHARTS = 3
 _AROUND = 1.35
 """Ratio of the chart's ends to the slowest and the fastest speed of the run."""
+_WAY = '#777777'
 _LOW, _HIGH = 60.0, 30000.0
 
 
@@ -48,14 +51,18 @@ class Bearing(NamedTuple):
 
 
 def stays_of(history: History) -> list[Stay]:
-    """The operating points of a run in order."""
-    times = sorted({0.0, *(change.time for change in history.changes)})
-    ends = [*times[1:], max(history.duration, times[-1])]
+    """The operating points of a run in order; where the spindle ramps, those that it reaches."""
+    begin, last = history.begin, history.duration
+    changes = sorted({change.time for change in history.changes if begin < change.time <= last})
+    times, ends = [begin, *changes], [*changes, last]
     raised = [flag.time for flag in history.flags if flag.chatter]
     return [
-        Stay(k + 1, start, end, history.cut_at(start), any(start <= t < end for t in raised))
+        Stay(
+            k + 1, start, end, history.cut_at(max(start, float(np.nextafter(end, begin)))),
+            any(start <= time < end for time in raised),
+        )
         for k, (start, end) in enumerate(zip(times, ends, strict=True))
-    ]
+    ]  # fmt: skip
 
 
 def bearings_of(history: History) -> list[Bearing]:
@@ -86,9 +93,13 @@ def draw_path(axes: Axes, history: History, bearing: Bearing) -> None:
     # Grey: the way into and out of this chart from others.
     for before, after in itertools.pairwise(stays):
         if before in here or after in here:
+            begin, (x, depth) = _point(before.cut), _point(after.cut)
+            if history.spindle_acceleration:  # the depth steps, the speed is on its way
+                axes.plot((begin[0], begin[0]), (begin[1], depth), color=_WAY, lw=1.2)
+                begin = begin[0], depth
             axes.annotate(
-                '', _point(after.cut), _point(before.cut),
-                arrowprops={'arrowstyle': '->', 'color': '#777777', 'lw': 1.2, 'shrinkB': 7},
+                '', (x, depth), begin,
+                arrowprops={'arrowstyle': '->', 'color': _WAY, 'lw': 1.2, 'shrinkB': 7},
             )  # fmt: skip
     for stay in here:
         x, y = _point(stay.cut)
@@ -99,7 +110,8 @@ def draw_path(axes: Axes, history: History, bearing: Bearing) -> None:
     axes.plot([], [], 'o', color='k', mfc='white', label='operating point, in order')
     if any(stay.chatter for stay in here):
         axes.plot([], [], 'o', color='k', mfc=ALARM, label='chatter flagged there')
-    axes.legend(loc='lower right', fontsize=8, framealpha=0.9)
+    place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.17)}
+    axes.legend(**place, ncols=3, fontsize=8, frameon=False)
     title = {
         BearingContact.NONE: 'no bearing clearance',
         BearingContact.GAP: f'clearance {bearing.clearance * 1e6:g} µm, '

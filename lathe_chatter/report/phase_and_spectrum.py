@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for
+from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for, widen
 from lathe_chatter.report.history import History
 from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.stability import contact_at, rightmost_root
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _BODIES = (('tool', TOOL, 'o'), ('workpiece', WORKPIECE, 's'))
 _HIGHEST = 600.0
 """Hz that a spectrum shows."""
+_HEADROOM = 0.12
+"""Of a portrait, above its curves."""
 _DECADES = 4.0
 _LEAST = 1e-6
 """m: half an axis at least, and 1e-3 m/s. A cut at rest is a point: its rounding is no motion."""
@@ -47,7 +49,9 @@ def draw_portrait(axes: Axes, history: History, excerpt: Excerpt) -> None:
         f'{cut.depth_of_cut * 1e3:g} mm',
         fontsize=10,
     )
-    axes.legend(loc='upper right', frameon=False, fontsize=8)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + _HEADROOM * (high - low))  # the legend covers no curve
+    axes.legend(loc='upper center', frameon=False, fontsize=8, ncols=2)
 
 
 def draw_section(axes: Axes, history: History, excerpt: Excerpt) -> None:
@@ -109,7 +113,7 @@ def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool)
         # From faint to full: whether the points run in or out is then plain.
         shades = [(*to_rgb(colour), alpha) for alpha in np.linspace(0.15, 1.0, x.size).tolist()]
         axes.scatter(x, y, s=9, color=shades, marker=marker, lw=0)
-    _widen(axes, _LEAST * places.factor, _LEAST_VELOCITY * speeds.factor)
+    widen(axes, x=_LEAST * places.factor, y=_LEAST_VELOCITY * speeds.factor)
     if all(x.size and float(np.ptp(x)) < _FAINTEST for x, _ in pairs.values()):
         _say_at_rest(axes, 'both at rest, within 1 nm')
     axes.set_xlabel(places.label('displacement'))
@@ -120,13 +124,3 @@ def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool)
 def _say_at_rest(axes: Axes, text: str) -> None:
     """Say in the middle of a plot why it is empty."""
     axes.text(0.6, 0.25, text, transform=axes.transAxes, ha='center', fontsize=9, color=NEUTRAL)
-
-
-def _widen(axes: Axes, least_x: float, least_y: float) -> None:
-    """Give both axes at least some width."""
-    for limits, setter, least in (
-        (axes.get_xlim(), axes.set_xlim, least_x),
-        (axes.get_ylim(), axes.set_ylim, least_y),
-    ):
-        middle, half = 0.5 * sum(limits), 0.5 * (limits[1] - limits[0])
-        setter(middle - max(half, least), middle + max(half, least))

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from lathe_chatter.plot_style import new_figure, save
 from lathe_chatter.report.history import History
 from lathe_chatter.report.operating_points import bearings_of, draw_path
 from lathe_chatter.report.phase_and_spectrum import draw_portrait, draw_section, draw_spectrum
-from lathe_chatter.report.signal_views import excerpts_of
+from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.report.time_histories import draw_time_histories
 
 
-def draw_run(history: History, path: Path) -> None:
+def draw_run(history: History, excerpts: Sequence[Excerpt], path: Path) -> None:
     """Draw a run: time histories, phase portraits, spectra, sections and the chart.
 
     Args:
         history: The run.
+        excerpts: Of it.
         path: Of the PNG file to write; an SVG is put beside it.
     """
     figure = new_figure(12.0, 21.0)
@@ -24,7 +26,6 @@ def draw_run(history: History, path: Path) -> None:
     tool = figure.add_subplot(rows[0])
     others = [figure.add_subplot(rows[k], sharex=tool) for k in (1, 2, 3)]
     draw_time_histories([tool, *others], history)
-    excerpts = excerpts_of(history)
     for row, draw in ((4, draw_portrait), (5, draw_spectrum), (6, draw_section)):
         cells = rows[row].subgridspec(1, len(excerpts))
         for place, excerpt in enumerate(excerpts):

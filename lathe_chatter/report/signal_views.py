@@ -108,36 +108,38 @@ def excerpts_of(history: History) -> list[Excerpt]:
     """Two or three that are worth a closer look: before anything happened, chatter, the end."""
     end = history.duration
     disturbances = _disturbances(history)
-    first = disturbances[0] if disturbances else min(_PORTRAIT, end)
+    first = disturbances[0] if disturbances else min(history.begin + _PORTRAIT, end)
     wanted = [('before the first change' if disturbances else 'at the start', first)]
-    spans = history.chatter_spans()
+    spans = [span for span in history.chatter_spans() if span[1] > history.begin]
     if spans:
         start, stop = spans[0]
         inside = [time for time in disturbances if start < time < stop]
         wanted.append(('chatter', inside[0] if inside else stop))
     if end > wanted[-1][1]:
         wanted.append(('at the end', end))
-    return [_excerpt(history, title, until) for title, until in wanted]
+    begins = [_undisturbed_since(history, until) for _, until in wanted]
+    samples = history.samples.between(
+        [(begin, until) for begin, (_, until) in zip(begins, wanted, strict=True)]
+    )
+    return [
+        Excerpt(title, until, history.cut_at(0.5 * (begin + until)), signals)
+        for (title, until), begin, signals in zip(wanted, begins, samples, strict=True)
+    ]
 
 
 def _disturbances(history: History) -> list[float]:
-    """When the cut was changed or knocked, s."""
+    """When the cut was changed or knocked, or its spindle reached its speed, s."""
     times = [change.time for change in history.changes] + [k.time for k in history.knocks]
-    return sorted(time for time in times if 0.0 < time <= history.duration)
+    times += [ramp.end for ramp in history.ramps]
+    return sorted({time for time in times if history.begin < time <= history.duration})
 
 
-def _excerpt(history: History, title: str, until: float) -> Excerpt:
-    """The samples before an instant, back to what happened before it."""
-    since = max((time for time in _disturbances(history) if time < until - 1e-9), default=0.0)
-    since = max(since, until - _LONGEST)
-    time = history.samples['time']
-    inside = (time > since) & (time <= until)
-    return Excerpt(
-        title,
-        until,
-        history.cut_at(0.5 * (since + until)),
-        {name: values[inside] for name, values in history.samples.items()},
-    )
+def _undisturbed_since(history: History, until: float) -> float:
+    """From when on nothing happened before an instant, s; not too long ago."""
+    before = (time for time in _disturbances(history) if time < until - 1e-9)
+    # The first sample is in it: a span is what comes after its begin.
+    begin = history.begin - 1e-9 * (1.0 + abs(history.begin))
+    return max(max(before, default=begin), until - _LONGEST)
 
 
 def spectrum(time: Array, signal: Array) -> Spectrum:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,9 +18,10 @@ from lathe_chatter.plot_style import (
     NEUTRAL,
     TOOL,
     WORKPIECE,
-    envelope,
+    Scale,
     grid,
     scale_for,
+    widen,
 )
 from lathe_chatter.report.history import History
 from lathe_chatter.stability import contact_at, rightmost_root
@@ -29,8 +31,14 @@ if TYPE_CHECKING:
 
 _LABEL_WIDTH = 0.12
 """Of the picture, that a label above it takes."""
+_GAPS = 200
+"""That are hatched at most."""
 _SILENCE = 0.2
 """s between two figures of the monitor from which on they are not joined: it knew none."""
+_RAMP_POINTS = 25
+"""At which the root is computed while the spindle ramps."""
+_LEAST = {'m': 1e-9, 'N': 1e-3}
+"""Half an axis at least. What moves less is at rest, and its rounding is no motion."""
 _BODIES = (('tool', TOOL), ('workpiece', WORKPIECE))
 
 
@@ -48,61 +56,94 @@ def draw_time_histories(panels: Sequence[Axes], history: History) -> None:
     for axes in panels:
         _mark(axes, history)
         grid(axes)
-        axes.margins(x=0.0)
         axes.tick_params(labelbottom=axes is growth)
     _label_changes(tool, history)
 
 
 def _draw_displacements(tool: Axes, workpiece: Axes, history: History) -> None:
     """Both envelopes, and the clearance where there is one."""
-    time = history.samples['time']
     for axes, (name, colour) in zip((tool, workpiece), _BODIES, strict=True):
-        values = history.samples[f'{name}_displacement']
-        scale = scale_for('m', values)
-        envelope(axes, time, values * scale.factor, colour)
+        scale = _draw_signal(axes, history, f'{name}_displacement', 'm', colour)
         axes.set_ylabel(f'{name}\n{scale.label("displacement")}')
         if name == 'workpiece' and history.start.bearing_contact is not BearingContact.NONE:
-            edges = [0.0, *(change.time for change in history.changes), history.duration]
+            edges = _edges(history)
             gaps = [history.cut_at(edge).bearing_clearance * scale.factor for edge in edges]
             axes.step(
                 edges, gaps, where='post', color='k', lw=1, ls='--', label='bearing clearance'
             )
-            axes.legend(loc='upper left', frameon=False)
+            _legend_above(axes)
+        widen(axes, y=_LEAST['m'] * scale.factor)
 
 
 def _draw_force(axes: Axes, history: History) -> None:
     """The cutting force: at zero the tool is out of the cut."""
-    values = history.samples['cutting_force']
-    scale = scale_for('N', values)
-    envelope(axes, history.samples['time'], values * scale.factor, NEUTRAL)
+    scale = _draw_signal(axes, history, 'cutting_force', 'N', NEUTRAL)
     axes.set_ylabel(scale.label('cutting\nforce'))
+    widen(axes, y=_LEAST['N'] * scale.factor)
+
+
+def _draw_signal(axes: Axes, history: History, name: str, unit: str, colour: str) -> Scale:
+    """The band between the smallest and largest values; a short signal as it is."""
+    extremes = history.samples.extremes
+    low, high = extremes.of(name)
+    scale = scale_for(unit, low[np.isfinite(low)], high[np.isfinite(high)], _LEAST[unit])
+    if extremes.samples == 1:
+        axes.plot(extremes.times, low * scale.factor, color=colour, lw=0.8)
+    else:
+        axes.fill_between(
+            extremes.times, low * scale.factor, high * scale.factor, color=colour, lw=0.4
+        )
+    return scale
+
+
+def _edges(history: History) -> list[float]:
+    """Simulated times from one of which to the next the cut is one, or the spindle ramps, s."""
+    times = [change.time for change in history.changes] + [r.end for r in history.ramps]
+    inside = {time for time in times if history.begin < time < history.duration}
+    return sorted({history.begin, history.duration} | inside)
 
 
 def _draw_rates(axes: Axes, history: History) -> None:
     """Growth rates: what the monitor measured, and the root of the cut in force."""
-    edges = [0.0, *(change.time for change in history.changes), history.duration]
-    rates = []
-    for edge in edges:
-        cut = history.cut_at(edge)
-        contact = contact_at(history.machine, cut, tool_leaves_cut=history.tool_leaves_cut)
-        root = rightmost_root(
-            history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
-        )
-        rates.append(root.real)
-    axes.step(edges, rates, where='post', color='k', lw=1.2, ls='--', label='rightmost root')
+    edges = set(_edges(history))
+    for ramp in history.ramps:
+        edges |= set(np.linspace(ramp.start, ramp.end, _RAMP_POINTS).tolist())
+    times, rates = [], []
+    for edge in sorted(edge for edge in edges if history.begin <= edge <= history.duration):
+        # A step is drawn upright: what held until then, and what holds from then on.
+        for time in (np.nextafter(edge, -np.inf), edge):
+            if time >= history.begin:
+                times.append(edge)
+                rates.append(_rate_at(history, float(time)))
+    axes.plot(times, rates, color='k', lw=1.2, ls='--', label='rightmost root')
     known = history.estimates.get('growth_rate')
     low, high = min(rates), max(rates)
     if known is not None and known.shape[1]:
-        times, growth = apart(known, _SILENCE)
-        axes.plot(times, growth, color=NEUTRAL, lw=1.0, marker='.', ms=1.5, label='monitor')
+        measured = apart(known, _SILENCE)
+        axes.plot(*measured, color=NEUTRAL, lw=1.0, marker='.', ms=1.5, label='monitor')
         spread = np.nanpercentile(known[1], [2, 98])
         low, high = min(low, spread[0]), max(high, spread[1])
     margin = 0.15 * max(high - low, 1.0)
     axes.set_ylim(min(low - margin, -5.0), max(high + margin, 5.0))
     axes.axhline(0.0, color='k', lw=0.8)
-    axes.legend(loc='upper left', frameon=False, ncols=2, fontsize=9)
+    _legend_above(axes)
     axes.set_ylabel('growth rate / s$^{-1}$')
     axes.set_xlabel('simulated time / s')
+
+
+def _legend_above(axes: Axes) -> None:
+    """A legend above the plot, where no line strikes it through."""
+    place = {'loc': 'lower right', 'bbox_to_anchor': (1.0, 0.97)}
+    axes.legend(**place, frameon=False, ncols=2, fontsize=9)
+
+
+def _rate_at(history: History, time: float) -> float:
+    """Growth rate of the rightmost root of the cut in force at a simulated time, 1/s."""
+    cut = history.cut_at(time)
+    contact = contact_at(history.machine, cut, tool_leaves_cut=history.tool_leaves_cut)
+    return rightmost_root(
+        history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
+    ).real
 
 
 def apart(series: Array, silence: float) -> Array:
@@ -112,18 +153,21 @@ def apart(series: Array, silence: float) -> Array:
 
 
 def _mark(axes: Axes, history: History) -> None:
-    """Parameter changes and knocks as lines, the raised flag as a shade."""
+    """Parameter changes and knocks as lines, the raised flag as a shade, gaps as hatching."""
     for knock in history.knocks:
         axes.axvline(knock.time, color=KNOCK, lw=0.9, ls='-.')
     for change in history.changes:
         axes.axvline(change.time, color='k', lw=0.9, ls=':')
     for start, end in history.chatter_spans():
         axes.axvspan(start, end, color=ALARM, alpha=0.22, lw=0)
+    for gap in history.samples.gaps[:_GAPS]:
+        if not gap.restart:
+            axes.axvspan(*gap, facecolor='none', edgecolor='#999999', hatch='////', lw=0)
+    axes.set_xlim(history.begin, max(history.duration, history.begin + 1e-9))
 
 
 def _label_changes(axes: Axes, history: History) -> None:
-    """Say above the plot what changed, and where the flag was up."""
-    last, height = -history.duration, 4
+    """Say above the plot what changed, where the flag was up, and where samples are missing."""
     labels = [
         (change.time, '\n'.join(on_the_shop_floor(*entry) for entry in change.new.items()), 'k')
         for change in history.changes
@@ -132,13 +176,20 @@ def _label_changes(axes: Axes, history: History) -> None:
         (knock.time, f'knock {knock.impulse * 1e3:g} mN s', 'k') for knock in history.knocks
     ]
     spans = history.chatter_spans()
-    labels += [(max(start, 0.0), 'chatter flagged', ALARM_TEXT) for start, _ in spans[:1]]
-    for time, text, colour in sorted(labels):
+    labels += [(start, 'chatter flagged', ALARM_TEXT) for start, _ in spans[:1]]
+    missing = [gap for gap in history.samples.gaps if not gap.restart]
+    labels += [(gap.before, 'samples missing', 'k') for gap in missing[:1]]
+    length = history.duration - history.begin
+    last, height = -math.inf, 4
+    for at, text, colour in sorted(labels):
+        time = min(max(at, history.begin), history.duration)
         # One that would run into the one before stands above it.
-        near = time - last < _LABEL_WIDTH * history.duration
+        near = time - last < _LABEL_WIDTH * length
         height = height + 12 * (text.count('\n') + 1) if near else 4
         last = time
+        late = time > history.duration - 0.5 * _LABEL_WIDTH * length
         axes.annotate(
-            text, (time, 1.0), (3, height), xycoords=('data', 'axes fraction'),
+            text, (time, 1.0), (-3 if late else 3, height), xycoords=('data', 'axes fraction'),
             textcoords='offset points', fontsize=9, va='bottom', color=colour,
+            ha='right' if late else 'left',
         )  # fmt: skip

@@ -11,6 +11,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut
 from lathe_chatter.report.history import History
 from lathe_chatter.report.phase_and_spectrum import draw_portrait, draw_section, draw_spectrum
+from lathe_chatter.report.run_samples import RunSamples
 from lathe_chatter.report.signal_views import excerpts_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
@@ -21,7 +22,7 @@ from lathe_chatter.samples import SAMPLE_COLUMNS
 def test_a_cut_at_rest_is_said_to_be_at_rest(depth: float, at_rest: bool) -> None:
     lathe = VirtualLathe(cut=Cut(depth_of_cut=depth))
     samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(40_000).T, strict=True))
-    history = History(Path('run'), lathe.machine, lathe.cut, samples)
+    history = History(Path('run'), lathe.machine, lathe.cut, RunSamples.of(samples))
     excerpt = excerpts_of(history)[-1]
     for draw in (draw_portrait, draw_section, draw_spectrum):
         axes = Figure().add_subplot()

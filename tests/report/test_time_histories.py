@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pathlib import Path
 
-from lathe_chatter.report.time_histories import apart
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.report.history import History
+from lathe_chatter.report.run_samples import RunSamples
+from lathe_chatter.report.time_histories import apart, draw_time_histories
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 
 def test_figures_are_not_joined_over_a_silence() -> None:
@@ -18,3 +27,31 @@ def test_a_series_without_a_silence_is_left_as_it_is() -> None:
     for count in (0, 1, 5):
         series = np.vstack([0.05 * np.arange(count), np.arange(count)])
         assert np.array_equal(apart(series, 0.2), series)
+
+
+def test_a_settled_run_has_axes_that_can_be_read() -> None:
+    lathe = VirtualLathe()
+    lathe.advance(1_000_000)
+    samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(20_000).T, strict=True))
+    figure = Figure()
+    panels = figure.subplots(4)
+    draw_time_histories(panels, History(Path('run'), Machine(), Cut(), RunSamples.of(samples)))
+    figure.draw_without_rendering()
+    for axes in panels:
+        assert not axes.yaxis.get_offset_text().get_text()
+        assert max(len(label.get_text()) for label in axes.get_yticklabels()) <= 8
+    assert panels[0].get_xlim() == pytest.approx((100.0001, 102.0))
+
+
+def test_a_gap_is_left_open() -> None:
+    lathe = VirtualLathe()
+    parts = [lathe.advance(1000)]
+    lathe.advance(500)
+    samples = np.concatenate([*parts, lathe.advance(1000)])
+    run = RunSamples.of(dict(zip(SAMPLE_COLUMNS, samples.T, strict=True)))
+    panels = Figure().subplots(4)
+    draw_time_histories(panels, History(Path('run'), Machine(), Cut(), run))
+    drawn = panels[0].lines[0].get_ydata()
+    assert len(drawn) == 2001
+    assert np.flatnonzero(np.isnan(drawn)).tolist() == [1000]
+    assert 'samples missing' in [text.get_text() for text in panels[0].texts]

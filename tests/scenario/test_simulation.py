@@ -33,7 +33,7 @@ def test_a_run_is_the_lathe_itself(tmp_path: Path) -> None:
     parts.append(lathe.advance(10_000 - 5677))
     history = read_history(tmp_path / 'run')
     expected = np.concatenate(parts)
-    for number, values in enumerate(history.samples.values()):
+    for number, values in enumerate(read_run(tmp_path / 'run').samples().columns.values()):
         assert values.tobytes() == np.ascontiguousarray(expected[:, number]).tobytes()
     assert done.samples == 10_000
     assert done.flagged is None

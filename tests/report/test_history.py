@@ -1,0 +1,68 @@
+"""What a run's record tells of its spindle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.cut_events import Change
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.report.history import History
+from lathe_chatter.report.run_samples import RunSamples
+from lathe_chatter.report.signal_views import excerpts_of
+from lathe_chatter.samples import SAMPLE_COLUMNS
+
+
+def history(parts: list[np.ndarray], changes: list[Change], acceleration: float) -> History:
+    samples = dict(zip(SAMPLE_COLUMNS, np.concatenate(parts).T, strict=True))
+    return History(
+        Path('run'), Machine(), Cut(), RunSamples.of(samples), changes,
+        spindle_acceleration=acceleration,
+    )  # fmt: skip
+
+
+def speed_change(time: float, speed: float) -> Change:
+    return Change(time, {}, {'spindle_speed_rpm': speed})
+
+
+@pytest.mark.parametrize('acceleration', [0.0, 1000.0])
+def test_the_speed_is_the_one_that_the_spindle_turned_with(acceleration: float) -> None:
+    """Also where a ramp is turned round on its way."""
+    lathe = VirtualLathe(spindle_acceleration=acceleration)
+    parts, changes = [lathe.advance(5000)], []
+    for speed, count in ((4000.0, 6000), (2500.0, 30_000)):
+        changes.append(speed_change(lathe.time, speed))
+        lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=speed))
+        parts.append(lathe.advance(count))
+    run = history(parts, changes, acceleration)
+    time, angle = np.concatenate(parts)[:, :2].T
+    between = 0.5 * (time[1:] + time[:-1])
+    turned = 60.0 * np.diff(angle) / np.diff(time)
+    # Corners apart, where it turns with both in one sample.
+    places = list(range(50, len(between), 997))
+    assert [run.speed_at(between[k]) for k in places] == pytest.approx(turned[places], rel=1e-6)
+    assert run.cut_at(lathe.time).spindle_speed_rpm == 2500.0
+
+
+def test_a_ramp_is_no_part_of_what_is_looked_at_closely() -> None:
+    lathe = VirtualLathe(spindle_acceleration=2000.0)
+    parts = [lathe.advance(10_000)]
+    lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=5000.0))
+    parts.append(lathe.advance(15_000))
+    run = history(parts, [speed_change(1.0, 5000.0)], 2000.0)
+    last = excerpts_of(run)[-1]
+    assert last.samples['time'][0] > 2.0
+    assert last.cut.spindle_speed_rpm == 5000.0
+
+
+def test_a_record_that_begins_late_has_full_panels() -> None:
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=1e-3))
+    lathe.advance(1_000_000)
+    run = history([lathe.advance(10_000)], [speed_change(50.0, 3000.0)], 0.0)
+    assert run.begin == pytest.approx(100.0001)
+    for excerpt in excerpts_of(run):
+        assert len(excerpt.samples['time']) >= 2499
+        assert excerpt.spectrum('tool_displacement').frequency.size

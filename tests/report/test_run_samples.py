@@ -1,0 +1,94 @@
+"""Samples that pass by leave the extremes of all and whatever is asked for, with its gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.report.run_samples import Gap, RunSamples
+
+RATE = 1000.0
+
+
+class _Blocks(NamedTuple):
+    columns: tuple[str, ...]
+    samples: Array
+    rows: Integers
+    log_times: Integers
+
+
+def blocks(parts: Iterable[Array], size: int = 10) -> list[_Blocks]:
+    """Samples (n, 2) as a record has them: received a second after they were taken."""
+    found = []
+    for part in parts:
+        rows = np.full(-(-len(part) // size), size)
+        rows[-1] = len(part) - size * (len(rows) - 1)
+        ends = part[np.cumsum(rows) - 1, 0]
+        found.append(_Blocks(('time', 'force'), part, rows, np.rint(1e9 * (ends + 1)).astype(int)))
+    return found
+
+
+def signal(count: int, start: float = 0.0) -> Array:
+    time = start + np.arange(1, count + 1) / RATE
+    return np.column_stack((time, np.random.default_rng(3).normal(size=count)))
+
+
+def test_the_extremes_are_those_of_all_samples() -> None:
+    samples = signal(100_003)
+    passed = RunSamples(lambda: blocks(np.array_split(samples, 37)))
+    assert (passed.count, passed.first, passed.last) == (100_003, 0.001, samples[-1, 0])
+    assert not passed.gaps
+    low, high = passed.extremes.of('force')
+    assert 1000 < len(low) <= 4096
+    assert (low.min(), high.max()) == (samples[:, 1].min(), samples[:, 1].max())
+    edges = np.searchsorted(samples[:, 0], passed.extremes.times)
+    assert np.array_equal(low, np.minimum.reduceat(samples[:, 1], edges))
+    assert np.array_equal(high, np.maximum.reduceat(samples[:, 1], edges))
+
+
+def test_a_short_signal_is_kept_as_it_is() -> None:
+    samples = signal(500)
+    passed = RunSamples.of({'time': samples[:, 0], 'force': samples[:, 1]})
+    assert passed.extremes.samples == 1
+    assert np.array_equal(passed.extremes.of('force')[0], samples[:, 1])
+
+
+@pytest.mark.parametrize('count', [400, 40_000])
+def test_nothing_is_joined_over_a_gap(count: int) -> None:
+    parts = [signal(count), signal(count, start=100.0), signal(count, start=50.0)]
+    passed = RunSamples(lambda: blocks(parts))
+    ends = [part[-1, 0] for part in parts]
+    assert passed.gaps == [Gap(ends[0], 100.001), Gap(ends[1], 50.001)]
+    assert [gap.restart for gap in passed.gaps] == [False, True]
+    times, low = passed.extremes.times, passed.extremes.of('force')[0]
+    assert np.isnan(times).sum() == 2
+    assert np.array_equal(np.isnan(times), np.isnan(low))
+    # What is computed from a span begins after the last gap in it.
+    (found,) = passed.between([(ends[0] - 0.1, 100.05)])
+    assert np.array_equal(found['time'], parts[1][:50, 0])
+
+
+def test_more_gaps_than_dots_do_not_fill_the_memory() -> None:
+    parts = [signal(20, start=0.1 * k) for k in range(20_000)]
+    passed = RunSamples(lambda: blocks(parts))
+    assert len(passed.gaps) == 19_999
+    assert len(passed.extremes.low) <= 4096
+    every = np.concatenate(parts)
+    assert np.nanmax(passed.extremes.of('force')[1]) == every[:, 1].max()
+
+
+def test_spans_are_every_sample_after_their_begin_up_to_their_end() -> None:
+    samples = signal(10_000)
+    passed = RunSamples(lambda: blocks(np.array_split(samples, 11)))
+    first, second = passed.between([(0.0, 0.25), (8.9985, 9.3)])
+    assert np.array_equal(first['time'], samples[:250, 0])
+    assert np.array_equal(second['force'], samples[8998:9300, 1])
+
+
+def test_other_things_are_dated_by_the_samples_about_them() -> None:
+    passed = RunSamples(lambda: blocks([signal(1000)]))
+    assert passed.simulated_time([1_500_000_000, 1_010_000_000]) == pytest.approx([0.5, 0.01])
