@@ -24,6 +24,8 @@ EXAMPLE = 'lathe-chatter report runs/20260401-120000'
 PICTURE = 'report.png'
 _LATE = 1e-3
 """s after which a record begins that has not the start of the cut."""
+_EXPLAINS = 0.1
+"""s before a flag in which advice is that of the flag."""
 _SAME_SPEED = 0.02
 """Part by which speeds may differ that are one piece of advice."""
 _ROUNDING = 1e-12
@@ -128,9 +130,9 @@ def _counted(count: int, word: str) -> str:
 
 def _occurrences(history: History) -> list[dict[str, Any]]:
     """Start, changes, flags, advice and end, in order of time."""
-    begin = history.begin
-    first = _cut_text(history.cut_at(begin))
-    result = [_entry(history, begin, f'start: {first}' if begin < _LATE else f'begin: {first}')]
+    # The start itself has no sample.
+    begin, word = (0.0, 'start') if history.begin < _LATE else (history.begin, 'record begins')
+    result = [_entry(history, begin, f'{word}: {_cut_text(history.cut_at(begin))}')]
     for change in history.changes:
         words = ', '.join(on_the_shop_floor(*changed) for changed in change.new.items())
         result.append(_entry(history, change.time, words))
@@ -160,8 +162,12 @@ def _advice(history: History) -> Iterator[tuple[float, float]]:
     """When the monitor recommended which speed, s and rev/min: at first, and where it changed."""
     recommended = history.estimates.get('recommended_speed_rpm')
     turns = [flag.time for flag in history.flags]
+    raised = [flag.time for flag in history.flags if flag.chatter]
     last, last_turn = math.nan, -1
     for time, speed in () if recommended is None else recommended.T.tolist():
+        # The figures that explain a flag are published before it.
+        after = next((flag for flag in raised if time <= flag < time + _EXPLAINS), None)
+        time = time if after is None else after  # noqa: PLW2901 -- when it was of use
         turn = bisect.bisect_right(turns, time)
         if turn != last_turn or not abs(speed / last - 1.0) <= _SAME_SPEED:
             yield time, speed

@@ -15,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
+from lathe_chatter.nodes.parameters import MONITOR
 from lathe_chatter.nodes.process_group import ProcessGroup, RunFailedError
 from lathe_chatter.scenario import Scenario
 
@@ -108,7 +109,13 @@ def _play(
                         {'output': str(output), 'attachments': [str(file.resolve())]}
                     ),
                 )
-                cell.start('chatter_monitor', 'lathe_chatter.nodes.monitor_node')
+                given = operator.scenario.parameters
+                cell.start(
+                    'chatter_monitor',
+                    'lathe_chatter.nodes.monitor_node',
+                    # The machine alone: of the cut it knows what the samples tell.
+                    parameter_arguments({name: given[name] for name in given if name in MONITOR}),
+                )
                 _await_nodes(operator, spin)
             cell.start(
                 'lathe',

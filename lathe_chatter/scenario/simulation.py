@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.config import config_from
 from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, knock_sentence
@@ -120,6 +120,7 @@ class _Simulation:
         self._estimate = Estimate()
         self._next_report = 0.0
         self._flag, self._state = False, ''
+        self._told_advice = Advice()
 
     def watch(self, detector: ChatterDetector) -> None:
         """Have a detector look at every block from now on."""
@@ -200,3 +201,7 @@ class _Simulation:
         )
         if what:
             self._tell(self._lathe.time, what)
+            self._told_advice = Advice()
+        if estimate.chatter and estimate.advice.differs_from(self._told_advice):
+            self._told_advice = estimate.advice
+            self._tell(self._lathe.time, estimate.advice.in_words(self._lathe.cut.depth_of_cut))

@@ -18,6 +18,8 @@ pytest.importorskip('rclpy', reason='ROS 2 is not there')
 pytest.importorskip('domain_coordinator', reason='domain_coordinator is not there')
 from domain_coordinator import domain_id
 
+from lathe_chatter.cli.main import main
+
 PACE = 2.0
 """Simulated seconds a second: the test need not take as long as the cut."""
 SHORT = f"""
@@ -79,8 +81,10 @@ def test_the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it(
     happened = [entry['what'] for entry in figures['occurrences']]
     assert happened[0].startswith('start: 3000 rev/min, depth 0.5 mm, clearance 5 µm')
     assert happened[1:3] == ['depth 0.62 mm', 'chatter flagged']
-    assert happened[3].endswith(' rev/min')
-    assert happened[4:] == ['flag cleared', 'end']
+    assert happened[3].startswith('advice: ')
+    others = [what for what in happened if not what.startswith('advice: ')]
+    assert others[3].endswith(' rev/min')
+    assert others[4:] == ['flag cleared', 'end']
     flagged, cured = figures['occurrences'][2], figures['occurrences'][-1]
     # The open machine alone would be stable at this cut, the seated one is not.
     assert flagged['roots']['open']['growth_rate'] < 0 < flagged['roots']['seated']['growth_rate']
@@ -110,6 +114,33 @@ def test_the_report_has_the_parameters_of_the_start(
     scenario.write_text(f'name: other\nduration: 0.5\nparameters: {start}\n')
     figures = play(scenario, tmp_path / 'run', environment)
     assert figures['occurrences'][0]['what'].startswith('start: 4100 rev/min, depth 0.3 mm')
+
+
+def test_the_monitor_knows_the_machine_of_the_scenario(
+    tmp_path: Path, environment: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its advice is that of a monitor without ROS, which has the machine of the lathe."""
+    scenario = tmp_path / 'heavier.yaml'
+    machine = 'tool.mass: 0.1, workpiece.mass: 0.12, workpiece.damping_ratio: 0.03'
+    start = f'{{real_time_factor: 2.0, depth_of_cut: 0.0004, {machine}}}'
+    scenario.write_text(
+        f'name: heavier\nduration: 4.0\nparameters: {start}\n'
+        'steps: [{at: 1.0, set: {depth_of_cut: 0.0018}}]\nexpect: {flagged: true}\n'
+    )
+    call = ['simulate', '--scenario', str(scenario), '--output', str(tmp_path / 'simulated')]
+    assert main([*call, '--monitor', '--report', '--json']) == 0
+    told = capsys.readouterr()
+    assert 'try ' in told.err
+    simulated = advised(json.loads(told.out))
+    assert advised(play(scenario, tmp_path / 'run', environment)) == pytest.approx(
+        simulated, rel=0.03
+    )
+
+
+def advised(figures: dict[str, Any]) -> float:
+    """The last speed that a report says was recommended, rev/min."""
+    words = [entry['what'] for entry in figures['occurrences']]
+    return float([word for word in words if word.startswith('advice: ')][-1].split()[1])
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
