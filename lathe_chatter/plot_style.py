@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from lathe_chatter.arrays import Array
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -86,6 +88,20 @@ def save(figure: Figure, path: Path) -> None:
     with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': path.stem}):
         figure.savefig(path.with_suffix('.png'), dpi=_DPI, metadata={'Software': None})
         figure.savefig(path.with_suffix('.svg'), metadata={'Date': None, 'Creator': None})
+
+
+def draw_band(
+    axes: Axes, time: Array, values: tuple[Array, Array], colour: str, label: str = ''
+) -> None:
+    """Draw the band between smallest and largest values (n,), or a line where they are the same.
+
+    A nan in them is a gap, which is left open.
+    """
+    low, high = values
+    if np.array_equal(low, high, equal_nan=True):
+        axes.plot(time, low, color=colour, lw=0.8, label=label)
+    else:
+        axes.fill_between(time, low, high, color=colour, lw=0.4, label=label)
 
 
 def widen(axes: Axes, *, x: float = 0.0, y: float = 0.0) -> None:

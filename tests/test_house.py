@@ -34,7 +34,7 @@ ARROWS = {
     'precompile': {'model', 'samples', 'lathe', 'detection'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'samples', 'lathe', 'detection', 'recording'},
-    'report': {'model', 'lathe', 'stability', 'knocks', 'recording'},
+    'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'nodes': {
         *('model', 'samples', 'lathe', 'detection', 'recording', 'scenario', 'precompile'),

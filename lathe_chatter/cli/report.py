@@ -77,27 +77,27 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
         'run': history.path,
         'picture': picture,
         'occurrences': occurrences,
-        'gaps': [gap for gap in history.samples.gaps if not gap.restart],
-        'restarts': [gap for gap in history.samples.gaps if gap.restart],
+        'gaps': history.samples.gaps,
+        'restarts': history.samples.restarts,
         'moments': [_excerpt_figures(excerpt) for excerpt in excerpts],
     }
 
 
 def _gap_sentences(history: History) -> Iterator[str]:
     """What the pictures leave out, in words."""
-    missing = [gap for gap in history.samples.gaps if not gap.restart]
-    if missing:
-        longest = max(missing, key=lambda gap: gap.after - gap.before)
+    gaps, restarts = history.samples.gaps, history.samples.restarts
+    if gaps:
+        before, after = max(gaps, key=lambda gap: gap[1] - gap[0])
         yield (
-            f'Samples are missing in {_counted(len(missing), "place")}, the longest from '
-            f'{longest.before:.6f} s to {longest.after:.6f} s: lines end there, and nothing is '
+            f'Samples are missing in {_counted(len(gaps), "place")}, the longest from '
+            f'{before:.6f} s to {after:.6f} s: lines end there, and nothing is '
             'computed across them.'
         )
-    restarts = [gap for gap in history.samples.gaps if gap.restart]
     if restarts:
+        before, after = restarts[0]
         yield (
             f'The simulated time went back {_counted(len(restarts), "time")}, first from '
-            f'{restarts[0].before:.6f} s to {restarts[0].after:.6f} s: the lathe started again, '
+            f'{before:.6f} s to {after:.6f} s: the lathe started again, '
             'and the pictures show one cut over the other.'
         )
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.plot_style import ALARM, axes_or_new, envelope, grid, scale_for
-from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.plot_style import ALARM, axes_or_new, draw_band, grid, scale_for
 from lathe_chatter.samples.columns import UNITS
+from lathe_chatter.samples.extremes import TIME, Extremes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,11 +37,12 @@ def plot_samples(samples: Samples, columns: Iterable[str], axes: Axes | None) ->
     if len(units) > 1:
         raise ParameterError('columns', ', '.join(names), '', 'columns of one unit')
     axes = axes_or_new(axes)
-    time = samples.columns[TIME]
+    extremes = Extremes.of_signals({name: samples.columns[name] for name in (TIME, *names)})
     scale = scale_for(units.pop(), *(samples.columns[name] for name in names))
     for number, name in enumerate(names):
         label = name.replace('_', ' ')
-        envelope(axes, time, samples.columns[name] * scale.factor, f'C{number}', label)
+        low, high = (values * scale.factor for values in extremes.of(name))
+        draw_band(axes, extremes.times, (low, high), f'C{number}', label)
     for before, after in samples.gaps:
         axes.axvspan(before, after, color='0.85', lw=0)
     axes.set_xlabel('simulated time / s')

@@ -12,13 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array, Integers
-
-TIME = 'time'
-_STRETCHES = 4096
-"""At most, into which the time of a run is divided: more than a picture has columns of dots."""
-_LARGER_THAN_STEP = 1.5
-"""A step of time between two samples so many times the usual one is a gap."""
-_NO_TIMES = np.zeros(0, np.int64)
+from lathe_chatter.samples.continuity import Continuity
+from lathe_chatter.samples.extremes import TIME, Extremes
 
 
 class SampleBlocks(Protocol):
@@ -41,51 +36,6 @@ class SampleBlocks(Protocol):
         """When each block was received, ns (blocks,)."""
 
 
-class Extremes(NamedTuple):
-    """The smallest and largest values of signals over short stretches of time.
-
-    Attributes:
-        columns: Names of the signals, the first the time.
-        low: The smallest values (stretches, k); of the time, when a stretch begins, s.
-        high: The largest (stretches, k).
-        piece: The number of the piece without a gap that a stretch is of (stretches,).
-        samples: In a stretch, at most.
-    """
-
-    columns: tuple[str, ...]
-    low: Array
-    high: Array
-    piece: Integers
-    samples: int = 1
-
-    def of(self, name: str) -> tuple[Array, Array]:
-        """The smallest and the largest values of a signal, nan where samples are missing."""
-        place = self.columns.index(name)
-        return self._apart(self.low[:, place]), self._apart(self.high[:, place])
-
-    @property
-    def times(self) -> Array:
-        """When each stretch begins, s; as many as `of` has, nan where samples are missing."""
-        return self._apart(self.low[:, self.columns.index(TIME)])
-
-    def _apart(self, values: Array) -> Array:
-        """With a nan between two pieces, so that no line joins them."""
-        result: Array = np.insert(values, np.flatnonzero(np.diff(self.piece)) + 1, np.nan)
-        return result
-
-
-class Gap(NamedTuple):
-    """Where samples do not follow each other: simulated times before and after, s."""
-
-    before: float
-    after: float
-
-    @property
-    def restart(self) -> bool:
-        """Whether time went back, as after a restart of the lathe."""
-        return self.after <= self.before
-
-
 class RunSamples:
     """Samples that pass by once when this is made, and once more for each call of `between`.
 
@@ -96,19 +46,19 @@ class RunSamples:
         count: Of the samples.
         first: Simulated time of the first, s.
         last: Simulated time of the last, s.
-        gaps: Where samples do not follow each other.
+        gaps: Where samples are missing: simulated times before and after, s.
+        restarts: Where simulated time went back: before and after, s.
         extremes: Of all signals.
     """
 
     def __init__(self, blocks: Callable[[], Iterable[SampleBlocks]]) -> None:
         """Let them pass by."""
         self._blocks = blocks
-        self.count, self.first, self.last = 0, 0.0, 0.0
-        self.gaps: list[Gap] = []
-        self._step = 0.0
-        received: list[Integers] = [_NO_TIMES]
+        self.first = 0.0
+        received: list[Integers] = [np.zeros(0, np.int64)]
         ends: list[Array] = [np.zeros(0)]
-        extremes: Extremes | None = None
+        continuity = Continuity(remember=True)
+        self.extremes = Extremes.none((TIME,))
         for block in blocks():
             samples, columns = block.samples, tuple(block.columns)
             if not len(samples):
@@ -117,17 +67,14 @@ class RunSamples:
             rows = np.asarray(block.rows)
             received.append(np.array(block.log_times)[rows > 0])
             ends.append(times[np.cumsum(rows)[rows > 0] - 1])
-            if extremes is None:
+            if not continuity.samples:
                 self.first = float(times[0])
-                empty = np.zeros((0, len(columns)))
-                extremes = Extremes(columns, empty, empty, _NO_TIMES)
-            breaks = self._breaks(times)
-            places = [columns.index(name) for name in extremes.columns]
-            extremes = _extended(extremes, samples[:, places], breaks)
-            self.count, self.last = self.count + len(times), float(times[-1])
-        self.extremes = extremes or Extremes(
-            (TIME,), np.zeros((0, 1)), np.zeros((0, 1)), _NO_TIMES
-        )
+                self.extremes = Extremes.none(columns)
+            places = [columns.index(name) for name in self.extremes.columns]
+            self.extremes = self.extremes.extended(samples[:, places], continuity)
+        self.count, self.last = continuity.samples, continuity.last or 0.0
+        self.gaps, self.restarts = continuity.gap_places, continuity.restart_places
+        self._step = continuity.step
         self._received, self._ends = np.concatenate(received), np.concatenate(ends)
 
     @classmethod
@@ -137,17 +84,6 @@ class RunSamples:
         rows = np.array([len(samples)])
         block = _InMemory(tuple(signals), samples, rows, np.zeros(1, np.int64))
         return cls(lambda: [block])
-
-    def _breaks(self, times: Array) -> Integers:
-        """Places of those of more samples that do not follow the one before; notes the gaps."""
-        joined = np.concatenate(([self.last], times)) if self.count else times
-        offset = 0 if self.count else 1
-        steps = np.diff(joined)
-        if self._step == 0.0 and len(steps):
-            self._step = max(float(np.median(steps)), 0.0)
-        places = np.flatnonzero(~((steps > 0.0) & (steps <= _LARGER_THAN_STEP * self._step)))
-        self.gaps += [Gap(float(joined[k]), float(joined[k + 1])) for k in places]
-        return places + offset
 
     def simulated_time(self, log_times: ArrayLike) -> Array:
         """Simulated times when other things were recorded, s: those of the blocks about them.
@@ -191,7 +127,7 @@ class RunSamples:
 
     def _after_gaps(self, begin: float, end: float) -> float:
         """From when on there is no gap before `end`, s."""
-        inside = [gap.after for gap in self.gaps if begin < gap.after <= end]
+        inside = [after for _, after in (*self.gaps, *self.restarts) if begin < after <= end]
         # The first sample after the gap belongs to it.
         return max([begin, *(after - 0.5 * self._step for after in inside)])
 
@@ -201,31 +137,3 @@ class _InMemory(NamedTuple):
     samples: Array
     rows: Integers
     log_times: Integers
-
-
-def _extended(known: Extremes, samples: Array, breaks: Integers) -> Extremes:
-    """With more samples (n, k), which follow each other but at some places."""
-    per = known.samples
-    pieces = np.zeros(len(samples), np.int64)
-    pieces[breaks] = 1
-    last = known.piece[-1] if len(known.piece) else 0
-    pieces = last + np.cumsum(pieces)
-    begins = _begins(pieces, per)
-    low = np.concatenate((known.low, np.minimum.reduceat(samples, begins)))
-    high = np.concatenate((known.high, np.maximum.reduceat(samples, begins)))
-    piece = np.concatenate((known.piece, pieces[begins]))
-    while len(piece) > _STRETCHES:
-        per *= 2
-        # Where there are more gaps than columns of dots, they are not shown each.
-        pairs = _begins(piece if piece[-1] - piece[0] < _STRETCHES // 4 else piece * 0, 2)
-        low, high = np.minimum.reduceat(low, pairs), np.maximum.reduceat(high, pairs)
-        piece = piece[pairs]
-    return Extremes(known.columns, low, high, piece, per)
-
-
-def _begins(pieces: Integers, count: int) -> Integers:
-    """Where groups of `count` begin that lie within one piece."""
-    first = np.flatnonzero(np.diff(pieces, prepend=pieces[:1] - 1))
-    place = np.arange(len(pieces))
-    within = place - np.repeat(first, np.diff(first, append=len(pieces)))
-    return np.flatnonzero(within % count == 0)

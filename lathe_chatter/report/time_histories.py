@@ -19,6 +19,7 @@ from lathe_chatter.plot_style import (
     TOOL,
     WORKPIECE,
     Scale,
+    draw_band,
     grid,
     scale_for,
     widen,
@@ -87,12 +88,7 @@ def _draw_signal(axes: Axes, history: History, name: str, unit: str, colour: str
     extremes = history.samples.extremes
     low, high = extremes.of(name)
     scale = scale_for(unit, low[np.isfinite(low)], high[np.isfinite(high)], _LEAST[unit])
-    if extremes.samples == 1:
-        axes.plot(extremes.times, low * scale.factor, color=colour, lw=0.8)
-    else:
-        axes.fill_between(
-            extremes.times, low * scale.factor, high * scale.factor, color=colour, lw=0.4
-        )
+    draw_band(axes, extremes.times, (low * scale.factor, high * scale.factor), colour)
     return scale
 
 
@@ -161,8 +157,7 @@ def _mark(axes: Axes, history: History) -> None:
     for start, end in history.chatter_spans():
         axes.axvspan(start, end, color=ALARM, alpha=0.22, lw=0)
     for gap in history.samples.gaps[:_GAPS]:
-        if not gap.restart:
-            axes.axvspan(*gap, facecolor='none', edgecolor='#999999', hatch='////', lw=0)
+        axes.axvspan(*gap, facecolor='none', edgecolor='#999999', hatch='////', lw=0)
     axes.set_xlim(history.begin, max(history.duration, history.begin + 1e-9))
 
 
@@ -177,8 +172,7 @@ def _label_changes(axes: Axes, history: History) -> None:
     ]
     spans = history.chatter_spans()
     labels += [(start, 'chatter flagged', ALARM_TEXT) for start, _ in spans[:1]]
-    missing = [gap for gap in history.samples.gaps if not gap.restart]
-    labels += [(gap.before, 'samples missing', 'k') for gap in missing[:1]]
+    labels += [(before, 'samples missing', 'k') for before, _ in history.samples.gaps[:1]]
     length = history.duration - history.begin
     last, height = -math.inf, 4
     for at, text, colour in sorted(labels):

@@ -204,4 +204,5 @@ class _Simulation:
             self._told_advice = Advice()
         if estimate.chatter and estimate.advice.differs_from(self._told_advice):
             self._told_advice = estimate.advice
-            self._tell(self._lathe.time, estimate.advice.in_words(self._lathe.cut.depth_of_cut))
+            words = estimate.advice.in_words(self._lathe.cut.depth_of_cut)
+            self._tell(self._lathe.time, f'advice: {words}')

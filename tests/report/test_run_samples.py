@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.report.run_samples import Gap, RunSamples
+from lathe_chatter.report.run_samples import RunSamples
 
 RATE = 1000.0
 
@@ -62,8 +62,8 @@ def test_nothing_is_joined_over_a_gap(count: int) -> None:
     parts = [signal(count), signal(count, start=100.0), signal(count, start=50.0)]
     passed = RunSamples(lambda: blocks(parts))
     ends = [part[-1, 0] for part in parts]
-    assert passed.gaps == [Gap(ends[0], 100.001), Gap(ends[1], 50.001)]
-    assert [gap.restart for gap in passed.gaps] == [False, True]
+    assert passed.gaps == [(ends[0], 100.001)]
+    assert passed.restarts == [(ends[1], 50.001)]
     times, low = passed.extremes.times, passed.extremes.of('force')[0]
     assert np.isnan(times).sum() == 2
     assert np.array_equal(np.isnan(times), np.isnan(low))

@@ -65,7 +65,8 @@ def test_the_shipped_story_is_told_without_ros(tmp_path: Path) -> None:
             history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
         )
         assert root.real < 0.0
-    assert len(told) == 4
+    assert len(told) == 5
+    assert told[2].startswith('advice: try ')
 
 
 def test_a_lathe_that_ends_says_why(tmp_path: Path) -> None:
