@@ -49,7 +49,10 @@ def test_a_full_disk_names_the_file_that_it_refuses(
     (run / 'report.png').symlink_to('/dev/full')
     assert cli.main(['report', str(run / 'run_0.mcap')]) == 2
     said = capsys.readouterr().err.strip()
-    assert said == f'lathe-chatter report: {run}/report.png: No space left on device.'
+    assert (
+        said
+        == f'lathe-chatter report: {run}/report.png cannot be written: No space left on device.'
+    )
 
 
 def test_a_scenario_whose_expectation_fails_is_exit_1(
