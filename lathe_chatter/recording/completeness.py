@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from lathe_chatter.recording.mcap_summary import body_is_sound, read_summary
 from lathe_chatter.recording.metadata import FILE_NAME
 from lathe_chatter.recording.provenance import IDENTITY, RECOVERED
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.run_file import Note, RecordedFile
+from lathe_chatter.recording.run_file import Note
 from lathe_chatter.recording.split_files import CLOSED
 from lathe_chatter.recording.unfinished_counts import FILE_NAME as UNFINISHED
 from lathe_chatter.recording.unfinished_counts import taken
@@ -23,12 +21,21 @@ def check_files(found: Verification) -> None:
     """Every file to its last byte, and that none is missing."""
     for damage in found.run.damage:
         found.lose(str(damage))
-    for path in found.run.files:
-        summary = read_summary(path)
-        if summary is None:
-            found.lose(f'{path.name} has no sound summary: readers that need one refuse it.')
-        elif not body_is_sound(path, summary):
-            found.lose(f'{path.name} is not, byte for byte, what was written.')
+    for file in found.run.opened:
+        name = file.path.name
+        if not file.has_end:
+            found.lose(f'{name} has no sound summary: readers that need one refuse it.')
+            continue
+        proof = file.prove()
+        if proof is False:
+            found.lose(f'{name} is not, byte for byte, what was written.')
+        elif proof is None:
+            what = 'any of it' if file.unproven else 'what stands outside of its chunks'
+            found.remark(
+                f'{name} has no CRC of its data: whether {what} was altered cannot be told.'
+            )
+        for text in file.contradictions():
+            found.lose(f'{name}: {text}.')
     folder = found.run.folder
     if folder is not None:
         if folder.metadata is None:
@@ -73,9 +80,8 @@ def lost_at_the_end(
     if not ours or (len(ends) >= len(run.files) and not ends[-1].get('next')):
         return []
     names: dict[int, str] = {}
-    for path in run.files:
-        known = RecordedFile(path, lambda _damage: None).known
-        names |= {number: channel.topic for number, channel in known.channels.items()}
+    for file in run.opened:
+        names |= {number: channel.topic for number, channel in file.known.channels.items()}
     found: list[str] = []
     for channel, (count, when) in sorted(counts.items()):
         name = names.get(channel, '')
@@ -95,8 +101,9 @@ def lost_at_the_end(
 def check_order(found: Verification) -> None:
     """That each file goes on in the next, as its writer noted at its end."""
     files = found.run.files
-    for path, following in zip(files, (*files[1:], None), strict=True):
-        nexts = [note.values.get('next', '') for note in _notes_of(path) if note.name == CLOSED]
+    for file, following in zip(found.run.opened, (*files[1:], None), strict=True):
+        path = file.path
+        nexts = [note.values.get('next', '') for note in file.notes() if note.name == CLOSED]
         name = following.name if following else ''
         if not nexts or nexts[-1] == name or nexts[-1] in found.missing:
             continue
@@ -126,10 +133,6 @@ def check_metadata(found: Verification) -> None:
                 f'{FILE_NAME} counts {told.get(name, 0)} messages of {name}, and '
                 f'{found.messages[name]} are there.'
             )
-
-
-def _notes_of(path: Path) -> list[Note]:
-    return list(RecordedFile(path, lambda _damage: None).notes())
 
 
 def noted(note: Note, name: str) -> Any:

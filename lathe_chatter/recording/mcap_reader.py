@@ -28,18 +28,17 @@ _FIELDS_ROOM = _CHUNK.size + 64
 """Bytes that surely hold these and the name."""
 _INDEX = struct.Struct('<HI')
 _SIZES = {Opcode.DATA_END: 4, Opcode.FOOTER: 20}
+"""Of the content of the records at the end; other records may have more than their fields."""
 _SIGNS = (b'\x03\x00\x00\x00lz4', b'\x04\x00\x00\x00zstd')
 """What a compressed chunk has after its other fields, which makes it easy to find."""
 _BEFORE_SIGN = _HEAD.size + _CHUNK.size - 4
 
-_Fields = tuple[int, int, int, int, str, int]
-"""First and last log time, size, CRC and compression of a chunk, and where its data begin."""
+_Fields = tuple[int, int, int, int, str, int, int]
+"""First and last log time, size, CRC and compression of a chunk, where its data begin, and how
+many bytes they are."""
 
 Read = Callable[[int, int], memoryview]
 """Reads so many bytes from an offset of a file, fewer where it ends."""
-
-Wanted = Callable[[int, int], bool]
-"""Whether a chunk is wanted, by its first and last log time in ns."""
 
 
 class Chunk(NamedTuple):
@@ -51,6 +50,7 @@ class Chunk(NamedTuple):
         last: Latest log time, ns.
         records: Uncompressed.
         indexes: Raw message indexes by channel, as far as they follow it.
+        proven: Whether the records have passed a CRC; else their writer made none.
     """
 
     offset: int
@@ -58,6 +58,15 @@ class Chunk(NamedTuple):
     last: int
     records: bytes
     indexes: dict[int, bytes]
+    proven: bool = True
+
+
+class ChunkHead(NamedTuple):
+    """A chunk that is passed by: where it begins, and its earliest and latest log time, ns."""
+
+    offset: int
+    first: int
+    last: int
 
 
 class Plain(NamedTuple):
@@ -93,19 +102,22 @@ class _BadChunkError(Exception):
     """A chunk that does not pass; the text is the phrase of a `Damage`."""
 
 
-def scan(file: Path, wanted: Wanted | None = None) -> Iterator[Chunk | Plain | Damage]:
-    """Walk the data section of a file.
+Found = Chunk | ChunkHead | Plain | Damage
+
+
+def scan(file: Path, *, chunks: bool = True) -> Iterator[Found]:
+    """Walk the data section of a file, to the record that ends it.
 
     Args:
         file: MCAP.
-        wanted: Chunks that it says no to are passed by, unread.
+        chunks: Whether these are read, and not passed by.
 
     Raises:
         OSError: If the file cannot be read.
     """
     descriptor = os.open(file, os.O_RDONLY)
     try:
-        yield from _Walk(file, descriptor, wanted).run()
+        yield from _Walk(file, descriptor, chunks=chunks).run()
     finally:
         os.close(descriptor)
 
@@ -135,9 +147,10 @@ def _chunk_at(read: Read, place: ChunkPlace) -> Chunk:
     fields = _fields(bytes(data[_HEAD.size : _HEAD.size + _FIELDS_ROOM]), length)
     if fields is None:
         raise _BadChunkError('the head of a chunk is damaged')
-    first, last, size, crc, name, begin = fields
-    records = _decompressed(data[_HEAD.size + begin :], name, size, crc)
-    return Chunk(place.offset, first, last, records, _indexes_in(indexes))
+    first, last, size, crc, name, begin, stored = fields
+    begin += _HEAD.size
+    records = _decompressed(data[begin : begin + stored], name, size, crc)
+    return Chunk(place.offset, first, last, records, _indexes_in(indexes), proven=crc != 0)
 
 
 def _indexes_in(data: memoryview) -> dict[int, bytes]:
@@ -148,22 +161,23 @@ def _indexes_in(data: memoryview) -> dict[int, bytes]:
         opcode, length = _HEAD.unpack_from(data, place)
         channel, size = _INDEX.unpack_from(data, place + _HEAD.size)
         end = place + _HEAD.size + length
-        if opcode != Opcode.MESSAGE_INDEX or length != _INDEX.size + size or end > len(data):
+        if opcode != Opcode.MESSAGE_INDEX or length < _INDEX.size + size or end > len(data):
             break
-        found[channel] = bytes(data[place + _HEAD.size + _INDEX.size : end])
+        begin = place + _HEAD.size + _INDEX.size
+        found[channel] = bytes(data[begin : begin + size])
         place = end
     return found
 
 
 class _Walk:
-    def __init__(self, file: Path, descriptor: int, wanted: Wanted | None) -> None:
+    def __init__(self, file: Path, descriptor: int, *, chunks: bool) -> None:
         self._file = file
         self._descriptor = descriptor
         self._size = os.fstat(descriptor).st_size
-        self._wanted = wanted
+        self._chunks = chunks
         self._sound = 0  # up to here nothing is in doubt
 
-    def run(self) -> Iterator[Chunk | Plain | Damage]:
+    def run(self) -> Iterator[Found]:
         """Every record in order, and every damage where it is."""
         position = len(MCAP0_MAGIC)
         if self._read(0, position) != MCAP0_MAGIC:
@@ -180,16 +194,15 @@ class _Walk:
                     return
                 continue
             opcode, length = found
-            if opcode in _SIZES:  # the end of the data
+            if opcode == Opcode.FOOTER:
                 return
             record, position = self._record(position, opcode, length)
-            if record is not None:
-                yield record
+            yield record
+            if opcode == Opcode.DATA_END:
+                return
 
-    def _record(
-        self, position: int, opcode: int, length: int
-    ) -> tuple[Chunk | Plain | Damage | None, int]:
-        """What a record is, None for an unwanted chunk, and where the next one begins."""
+    def _record(self, position: int, opcode: int, length: int) -> tuple[Found, int]:
+        """What a record is, and where the next one begins."""
         end = position + _HEAD.size + length
         if opcode != Opcode.CHUNK:
             offset = position + _HEAD.size
@@ -219,15 +232,15 @@ class _Walk:
             return None
         if opcode == Opcode.MESSAGE_INDEX:
             fields = self._read(position + _HEAD.size, _INDEX.size)
-            if len(fields) < _INDEX.size or _INDEX.unpack(fields)[1] != length - _INDEX.size:
+            if len(fields) < _INDEX.size or _INDEX.unpack(fields)[1] > length - _INDEX.size:
                 return None
         return opcode, length
 
     def _chunk_fields(self, position: int, length: int) -> _Fields | None:
         return _fields(self._read(position + _HEAD.size, _FIELDS_ROOM), length)
 
-    def _chunk(self, position: int, length: int) -> tuple[Chunk | None, int]:
-        """The chunk at a place with its indexes, None if it is not wanted, and where they end.
+    def _chunk(self, position: int, length: int) -> tuple[Chunk | ChunkHead, int]:
+        """The chunk at a place with its indexes, or its head, and where they end.
 
         Raises:
             _BadChunkError: If its data are not what was written.
@@ -236,17 +249,18 @@ class _Walk:
         fields = self._chunk_fields(position, length)
         if fields is None:
             raise _BadChunkError('the head of a chunk is damaged')
-        first, last, size, crc, name, begin = fields
-        data = position + _HEAD.size + begin
-        if self._wanted is not None and not self._wanted(first, last):
-            return None, end
-        records = _decompressed(self._read(data, end - data), name, size, crc)
+        first, last, size, crc, name, begin, stored = fields
+        if not self._chunks:
+            return ChunkHead(position, first, last), end
+        data = self._read(position + _HEAD.size + begin, stored)
+        records = _decompressed(data, name, size, crc)
         indexes: dict[int, bytes] = {}
         while (found := self._head(end)) is not None and found[0] == Opcode.MESSAGE_INDEX:
             content = self._read(end + _HEAD.size, found[1])
-            indexes[_INDEX.unpack_from(content)[0]] = content[_INDEX.size :]
+            channel, size = _INDEX.unpack_from(content)
+            indexes[channel] = content[_INDEX.size : _INDEX.size + size]
             end += _HEAD.size + found[1]
-        return Chunk(position, first, last, records, indexes), end
+        return Chunk(position, first, last, records, indexes, proven=crc != 0), end
 
     def _next_chunk(self) -> int:
         """Where the next possible chunk begins after what is sound, or the end of the file."""
@@ -283,10 +297,10 @@ def _fields(head: bytes, length: int) -> _Fields | None:
     if letters > 16 or begin > len(head):  # no name is so long
         return None
     (stored,) = struct.unpack_from('<Q', head, begin - 8)
-    if begin + stored != length:
+    if begin + stored > length:
         return None
     name = head[_CHUNK.size : _CHUNK.size + letters].decode('ascii', 'replace')
-    return first, last, size, crc, name, begin
+    return first, last, size, crc, name, begin, stored
 
 
 def _decompressed(data: bytes | memoryview, name: str, size: int, crc: int) -> bytes:

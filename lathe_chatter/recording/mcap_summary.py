@@ -16,10 +16,9 @@ from mcap.records import Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 _FOOTER = struct.Struct('<BQQQI')
-_DATA_END = struct.Struct('<BQI')
 _AT_ONCE = 1 << 22
 _HEAD = struct.Struct('<BQ')
-_CHUNK_INDEX = struct.Struct('<16xQQI')
+_CHUNK_INDEX = struct.Struct('<QQQQI')
 _CHANNEL_OFFSET = struct.Struct('<HQ')
 _INDEX_HEAD = 15
 """Bytes of a message index before its entries, which have 16 each."""
@@ -30,6 +29,8 @@ class ChunkPlace(NamedTuple):
     """Where a chunk is in its file.
 
     Attributes:
+        first: Earliest log time, ns.
+        last: Latest log time, ns.
         offset: Of its first byte.
         length: Bytes.
         size: Of its records before compression, bytes.
@@ -37,6 +38,8 @@ class ChunkPlace(NamedTuple):
         indexes: Where each of them is in the file, as pairs of channel and offset ('<HQ').
     """
 
+    first: int
+    last: int
     offset: int
     length: int
     size: int
@@ -58,7 +61,7 @@ class Summary:
     """Schemas and channels by number, and the statistics.
 
     Attributes:
-        start: Where it begins in the file.
+        start: Where it begins in the file; where the footer does, if there is none.
         schemas: By number.
         channels: By number.
         statistics: None where the writer made none.
@@ -70,6 +73,14 @@ class Summary:
     channels: dict[int, Any] = field(default_factory=dict)
     statistics: Any = None
     chunks: list[ChunkPlace] = field(default_factory=list)
+
+    @property
+    def names_all(self) -> bool:
+        """Whether all schemas and channels of the file are known to be repeated here."""
+        counts = self.statistics
+        return counts is not None and (
+            (counts.schema_count, counts.channel_count) == (len(self.schemas), len(self.channels))
+        )
 
 
 def read_summary(file: Path) -> Summary | None:
@@ -88,6 +99,7 @@ def read_summary(file: Path) -> Summary | None:
         opcode, footer, start, _, crc = _FOOTER.unpack_from(end)
         if not end.endswith(MCAP0_MAGIC) or (opcode, footer) != (Opcode.FOOTER, 20):
             return None
+        start = start or size - length  # a sound file may have no summary
         if not 0 < start <= size - length:
             return None
         stream.seek(start)
@@ -100,24 +112,26 @@ def read_summary(file: Path) -> Summary | None:
         return None
 
 
-def body_is_sound(file: Path, summary: Summary) -> bool:
-    """Whether everything before the summary has its CRC; true where its writer made none.
+def body_is_sound(file: Path, size: int, expected: int) -> bool:
+    """Whether what a file begins with has its CRC.
+
+    Args:
+        file: Which.
+        size: Bytes before the end of the data.
+        expected: What the end of the data says.
 
     Raises:
         OSError: If the file cannot be read.
     """
     with file.open('rb') as stream:
-        left = summary.start - _DATA_END.size
         crc = 0
-        while left > 0:
-            data = stream.read(min(left, _AT_ONCE))
+        while size > 0:
+            data = stream.read(min(size, _AT_ONCE))
+            if not data:
+                return False
             crc = crc32(data, crc)
-            left -= len(data)
-        end = stream.read(_DATA_END.size)
-    if left < 0 or len(end) < _DATA_END.size:
-        return False
-    opcode, length, expected = _DATA_END.unpack(end)
-    return (opcode, length) == (Opcode.DATA_END, 4) and expected in (0, crc)
+            size -= len(data)
+    return crc == expected
 
 
 def _parsed(data: bytes, start: int) -> Summary:
@@ -135,15 +149,15 @@ def _parsed(data: bytes, start: int) -> Summary:
 
 
 def _chunk_place(data: bytes, place: int, length: int) -> ChunkPlace:
-    """What a chunk index says; the fields of the specification that are not named are not used."""
-    offset, size, letters = _CHUNK_INDEX.unpack_from(data, place)
+    """What a chunk index says; what it says of the compression is not used."""
+    first, last, offset, size, letters = _CHUNK_INDEX.unpack_from(data, place)
     begin = place + _CHUNK_INDEX.size
     indexes = data[begin : begin + letters]
-    (index_length,) = struct.unpack_from('<Q', data, begin + letters)
-    (uncompressed,) = struct.unpack_from('<Q', data, place + length - 8)
-    if len(indexes) % _CHANNEL_OFFSET.size:
-        raise ValueError('A chunk index has half an entry.')
-    return ChunkPlace(offset, size, uncompressed, index_length, indexes)
+    index_length, name = struct.unpack_from('<QI', data, begin + letters)
+    (uncompressed,) = struct.unpack_from('<8xQ', data, begin + letters + 12 + name)
+    if len(indexes) % _CHANNEL_OFFSET.size or begin + letters + 28 + name > place + length:
+        raise ValueError('A chunk index does not end where it should.')
+    return ChunkPlace(first, last, offset, size, uncompressed, index_length, indexes)
 
 
 def add_record(summary: Summary, opcode: int, content: bytes) -> None:

@@ -27,6 +27,7 @@ class Topic:
         definition: The full text of the type and of those that it uses (ros2msg).
         type_hash: RIHS01.
         qos: The profiles that its publishers offer, as rosbag2 writes them.
+        encoding: Of its messages.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Topic:
     definition: str
     type_hash: str
     qos: tuple[Mapping[str, Any], ...] = ()
+    encoding: str = 'cdr'
 
 
 class FileCount(NamedTuple):
@@ -74,7 +76,7 @@ def describe(
                     'topic_metadata': {
                         'name': topic.name,
                         'type': topic.type,
-                        'serialization_format': 'cdr',
+                        'serialization_format': topic.encoding,
                         'offered_qos_profiles': [dict(profile) for profile in topic.qos],
                         'type_description_hash': topic.type_hash,
                     },

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.completeness import lost_at_the_end
 from lathe_chatter.recording.mcap_reader import Damage
+from lathe_chatter.recording.mcap_writer import OpenChunk, record_bytes
+from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.provenance import RECOVERED
-from lathe_chatter.recording.raw_messages import raw_of
 from lathe_chatter.recording.run import Run, read_run
-from lathe_chatter.recording.run_file import RecordedFile, offers_of
-from lathe_chatter.recording.split_files import CLOSED
-from lathe_chatter.recording.writer import RunWriter, Topic
+from lathe_chatter.recording.run_file import Note, RecordedFile, offers_of
+from lathe_chatter.recording.split_files import CLOSED, RunFiles, TopicRecords
 
 _NOT_COPIED = (CLOSED, 'rosbag2')
 """Notes that a writer makes itself."""
+_COMMIT_SIZE = 1 << 24
+"""Bytes of messages after which what is copied is put on disk."""
 
 
 class Recovery(NamedTuple):
@@ -38,7 +42,7 @@ class Recovery(NamedTuple):
 
 
 def recover(path: Path | str, output: Path) -> Recovery:
-    """Save what is sound of a run; the original is only read.
+    """Save what is sound of a run, every message with its own type; the original is only read.
 
     Args:
         path: The run, a folder or a file.
@@ -50,52 +54,96 @@ def recover(path: Path | str, output: Path) -> Recovery:
         OSError: If it cannot be written.
     """
     old = read_run(path, damaged=True)
-    saved: Counter[str] = Counter()
-    last: dict[str, int] = {}
     damage: list[Damage] = [*old.damage]
-    with atomic_folder(output), RunWriter(output) as writer:
+    distribution = str(((old.folder and old.folder.metadata) or {}).get('ros_distro', 'unknown'))
+    with atomic_folder(output):
+        copy = _Copy(output, distribution)
         for place, file in enumerate(old.files):
             if place:
-                writer.split()
-            _copy(RecordedFile(file, damage.append), writer, saved, last)
-        lost = lost_at_the_end(old, saved, last)
-        said = json.dumps([*map(str, damage), *lost])
-        writer.note(RECOVERED, {'from': str(old.path), 'damage': said})
-    return Recovery(read_run(output), saved, damage, lost)
+                copy.files.split()
+            copy.add(RecordedFile(file, damage.append))
+        lost = lost_at_the_end(old, copy.messages, copy.last)
+        noted = json.dumps([*map(str, damage), *lost])
+        copy.files.note(RECOVERED, {'from': str(old.path), 'damage': noted})
+        copy.files.close()
+    return Recovery(read_run(output), copy.messages, damage, lost)
 
 
-def _copy(
-    file: RecordedFile, writer: RunWriter, saved: Counter[str], last: dict[str, int]
-) -> None:
-    """Copy what one file holds, counting messages and noting when the last was received."""
-    for note in file.notes():
-        if note.name not in _NOT_COPIED:
-            writer.note(note.name, note.values)
-    for attachment in file.attachments():
-        writer.attach(attachment.name, attachment.media_type, attachment.data)
-    for contents in file.contents():
-        for raw in raw_of(file, contents.messages):
-            writer.add_topic(_topic(file, raw.topic))
-            writer.write(
-                raw.topic,
-                raw.data,
-                log_time=raw.log_time,
-                publish_time=raw.publish_time,
-                sequence=raw.sequence,
+class _Copy:
+    """A new run with what others hold.
+
+    Args:
+        folder: To make.
+        distribution: Of ROS.
+
+    Attributes:
+        files: Of the new run.
+        messages: Copied, by name of topic.
+        last: When the last was received, by name of topic, ns since the epoch.
+    """
+
+    def __init__(self, folder: Path, distribution: str) -> None:
+        self.files = RunFiles(
+            folder,
+            distribution,
+            min_free_space=0,
+            split_duration=math.inf,
+            split_size=math.inf,
+        )
+        self.messages: Counter[str] = Counter()
+        self.last: dict[str, int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._numbers: dict[bytes, int] = {}
+        self._described: dict[int, bytes] = {}
+        self._noted: list[Note] = []
+
+    def add(self, file: RecordedFile) -> None:
+        """Copy what a file holds."""
+        for note in file.notes():
+            if note.name not in _NOT_COPIED and note not in self._noted:
+                self._noted.append(note)
+                self.files.note(note.name, note.values)
+        for attachment in file.attachments():
+            self.files.attach(attachment.name, attachment.media_type, attachment.data)
+        size = 0
+        for contents in file.contents():
+            chunk = OpenChunk(self._described)
+            for raw in file.raw_of(contents.messages):
+                number = self._number(raw.channel, raw.schema)
+                chunk.add_message(number, raw.log_time, raw.publish_time, raw.sequence, raw.data)
+                self.messages[raw.topic] += 1
+                self.last[raw.topic] = max(raw.log_time, self.last.get(raw.topic, 0))
+            if chunk.has_messages:
+                self.files.add_chunk(chunk)
+            size += chunk.size
+            if size > _COMMIT_SIZE:
+                self.files.commit()
+                size = 0
+        for channel in file.known.channels.values():  # also those without a message
+            self._number(channel, file.known.schemas.get(channel.schema_id))
+        self.files.commit()
+
+    def _number(self, channel: Any, schema: Any) -> int:
+        """The number of a channel in the new run, which it gets when it is met first."""
+        schema_record, schema_id = b'', 0
+        if schema is not None:
+            key = schema.name, schema.encoding, bytes(schema.data)
+            new = key not in self._schemas
+            schema_id = self._schemas.setdefault(key, len(self._schemas) + 1)
+            schema_record = record_bytes(replace(schema, id=schema_id))
+        identity = record_bytes(replace(channel, id=0, schema_id=schema_id))
+        if identity not in self._numbers:
+            number = self._numbers[identity] = len(self._numbers) + 1
+            record = record_bytes(replace(channel, id=number, schema_id=schema_id))
+            self._described[number] = schema_record + record
+            topic = Topic(
+                channel.topic,
+                schema.name if schema is not None else '',
+                '',
+                channel.metadata.get('topic_type_hash', ''),
+                tuple(offers_of(channel)),
+                channel.message_encoding,
             )
-            saved[raw.topic] += 1
-            last[raw.topic] = max(raw.log_time, last.get(raw.topic, 0))
-        writer.commit()
-
-
-def _topic(file: RecordedFile, name: str) -> Topic:
-    """What a topic is, as the file describes it."""
-    channel = next(c for c in file.known.channels.values() if c.topic == name)
-    schema = file.known.schemas[channel.schema_id]
-    return Topic(
-        name,
-        schema.name,
-        schema.data.decode(),
-        channel.metadata.get('topic_type_hash', ''),
-        tuple(offers_of(channel)),
-    )
+            first = schema_record if schema is not None and new else b''
+            self.files.add_topic(TopicRecords(topic, first, record))
+        return self._numbers[identity]

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mcap.writer import MCAP0_MAGIC
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lathe_chatter.html_table import html_table
 from lathe_chatter.recording.bag_folder import RunFolder, RunReadError, run_folder
 from lathe_chatter.recording.dataframes import to_pandas, to_xarray
+from lathe_chatter.recording.decoding import Recorded, decoded
 from lathe_chatter.recording.mcap_reader import Damage
-from lathe_chatter.recording.raw_messages import Raw, Recorded, raw_of
-from lathe_chatter.recording.run_file import Contents, Note, RecordedFile
+from lathe_chatter.recording.run_file import Contents, Note, Raw, RecordedFile
 from lathe_chatter.recording.sample_reader import TIME, SampleBlocks, sample_blocks
 from lathe_chatter.recording.sample_series import Samples, joined, selection
 from lathe_chatter.samples.codec import SAMPLES_TYPE
@@ -50,26 +49,26 @@ class Run:
 
     @cached_property
     def topics(self) -> dict[str, str]:
-        """The type of each topic by name.
+        """The type of each topic by name; empty for one whose messages have no schema.
 
         Raises:
             RunReadError: If a file is damaged.
         """
         found: dict[str, str] = {}
-        for file in self._opened():
-            if not file.has_summary:
+        for file in self.opened:
+            if not file.has_end:
                 end = file.path.stat().st_size
-                self._on_damage(Damage(file.path, end, end, 'it has no sound summary'))
+                self._on_damage(Damage(file.path, end, end, 'it has no sound end'))
             found |= file.topics()
         return found
 
     def notes(self) -> list[Note]:
         """What was noted beside the messages, in every file, in order."""
-        return [note for file in self._opened() for note in file.notes()]
+        return [note for file in self.opened for note in file.notes()]
 
     def attachments(self) -> list[Any]:
         """Files that were kept in the run, as mcap has them: name, media_type, data."""
-        return [each for file in self._opened() for each in file.attachments()]
+        return [each for file in self.opened for each in file.attachments()]
 
     def contents(self) -> Iterator[tuple[RecordedFile, Contents]]:
         """The messages of each chunk of each file, as arrays, in the order of the files.
@@ -77,49 +76,44 @@ class Run:
         Raises:
             RunReadError: If a file is damaged.
         """
-        for file in self._opened():
+        for file in self.opened:
             for contents in file.contents():
                 yield file, contents
 
     def count_of_messages(self) -> int:
         """How many messages the files say that they have; 0 where they do not say."""
-        known = [file.known.statistics for file in self._opened()]
+        known = [file.known.statistics for file in self.opened]
         return sum(statistics.message_count for statistics in known if statistics is not None)
 
     def raw_messages(self, *topics: str) -> Iterator[Raw]:
         """The messages of some topics, or of all if none is named, as they are in the file.
 
-        In order of reception, also where chunks overlap.
+        In order of reception, whatever their order in a file.
 
         Raises:
             RunReadError: If a file is damaged.
         """
-        for file in self._opened():
-            waiting: list[Raw] = []
-            for contents in file.contents():
-                ready = [raw for raw in waiting if raw.log_time < contents.first]
-                if ready:
-                    yield from ready
-                    waiting = waiting[len(ready) :]
-                found = raw_of(file, contents.messages, topics)
-                waiting = sorted([*waiting, *found], key=lambda raw: raw.log_time)
-            yield from waiting
+        for file in self.opened:
+            yield from file.raw_messages(topics)
 
-    def messages(self, *topics: str) -> Iterator[Recorded]:
+    def messages(self, *topics: str, skip: bool = False) -> Iterator[Recorded]:
         """The messages of some topics in order of reception, decoded.
 
+        They are decoded by the definitions of their types in the file, whatever is installed.
+
+        Args:
+            topics: Names; all where none is named.
+            skip: Whether those that cannot be decoded are left out, instead of raising.
+
         Raises:
-            RunReadError: If a file is damaged.
+            RunReadError: If a file is damaged, or a message cannot be decoded.
         """
-        store = get_typestore(Stores.ROS2_JAZZY)
-        known = set(store.fielddefs)
         for raw in self.raw_messages(*topics):
-            if raw.type not in known:
-                definition = self._definition(raw.type)
-                store.register(get_types_from_msg(definition, raw.type))
-                known.add(raw.type)
-            message = store.deserialize_cdr(raw.data, raw.type)
-            yield Recorded(raw.topic, raw.log_time, raw.sequence, message, raw.publish_time)
+            found = decoded(raw)
+            if isinstance(found, Recorded):
+                yield found
+            elif not skip:
+                raise RunReadError(f'{self.path}: {found}')
 
     def sample_blocks(
         self, topic: str | None = None, columns: Iterable[str] | None = None
@@ -136,7 +130,7 @@ class Run:
         """
         name = topic or self.samples_topic()
         wanted = None if columns is None else tuple(columns)
-        for file in self._opened():
+        for file in self.opened:
             yield from sample_blocks(file, name, wanted)
 
     def samples(
@@ -163,7 +157,7 @@ class Run:
         """
         name = topic or self.samples_topic()
         wanted = selection(name, columns, start, end)
-        expected = sum(file.count(name) for file in self._opened())
+        expected = sum(file.count(name) for file in self.opened)
         found = joined(self.sample_blocks(name, wanted.columns), expected, wanted)
         if found is None:
             raise self.without_samples(name)
@@ -215,7 +209,7 @@ class Run:
     def count_of_samples(self, topic: str | None = None) -> int | None:
         """About how many samples a lathe has here; None where the files do not say."""
         name = topic or self.samples_topic()
-        blocks = sum(file.count(name) for file in self._opened())
+        blocks = sum(file.count(name) for file in self.opened)
         first = next(iter(self.sample_blocks(name)), None) if blocks else None
         return None if first is None else blocks * int(first.rows[0])
 
@@ -264,9 +258,10 @@ class Run:
             raise RunReadError(f'{self.path} holds several lathes, {", ".join(names)}: name one.')
         return names[0]
 
-    def _opened(self) -> Iterator[RecordedFile]:
-        for path in self.files:
-            yield RecordedFile(path, self._on_damage)
+    @cached_property
+    def opened(self) -> tuple[RecordedFile, ...]:
+        """Its files, each to be walked when it is asked."""
+        return tuple(RecordedFile(path, self._on_damage) for path in self.files)
 
     def _on_damage(self, damage: Damage) -> None:
         if not self.damaged:
@@ -275,13 +270,6 @@ class Run:
             )
         if damage not in self.damage:
             self.damage.append(damage)
-
-    def _definition(self, kind: str) -> str:
-        for file in self._opened():
-            for schema in file.known.schemas.values():
-                if schema.name == kind:
-                    return str(schema.data.decode())
-        raise RunReadError(f'{self.path} does not say what a {kind} is.')
 
 
 def _begins_as_mcap(path: Path) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -11,18 +12,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
+from isal.isal_zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
-from lathe_chatter.recording.mcap_reader import Chunk, Damage, Plain, Wanted, scan
+from lathe_chatter.recording.mcap_reader import Chunk, ChunkHead, Damage, Found, Plain, scan
 from lathe_chatter.recording.mcap_summary import Summary, add_record, body_is_sound, read_summary
 from lathe_chatter.recording.provenance import CHECK, OURS, checked
 
 _RECORD = struct.Struct('<BQ')
 _LOOSE_AT_ONCE = 1 << 20
+_LATEST = 2**64 - 1
+"""ns: no message is later."""
+_LOG_TIME = struct.Struct('<6xQ')
+"""Within the content of a message."""
 _UNREADABLE = (ValueError, EndOfFile, struct.error)
 """What parsing a record raises whose content is not of its kind."""
 
@@ -35,15 +41,39 @@ class Note(NamedTuple):
 
 
 class Contents(NamedTuple):
-    """The messages of one chunk.
+    """The messages of one chunk, or of some that are in none.
 
     Attributes:
-        first: Earliest log time, ns.
-        messages: All of them.
+        offset: Of the chunk, or of the last of these messages, in the file.
+        messages: All of them, as they were written.
     """
 
-    first: int
+    offset: int
     messages: Messages
+
+
+class Raw(NamedTuple):
+    """A message as it was recorded.
+
+    Attributes:
+        topic: Its name.
+        type: As `std_msgs/msg/Bool`; empty where it has no schema.
+        log_time: When it was received, ns since the epoch.
+        publish_time: When it was published, ns since the epoch.
+        sequence: Its number among those of its publisher; 0 from writers that keep none.
+        data: As it was serialised.
+        channel: As mcap has it: message_encoding, metadata.
+        schema: As mcap has it: encoding, data; None where it has none.
+    """
+
+    topic: str
+    type: str
+    log_time: int
+    publish_time: int
+    sequence: int
+    data: bytes
+    channel: Any
+    schema: Any
 
 
 class RecordedFile:
@@ -51,84 +81,172 @@ class RecordedFile:
 
     Args:
         path: Of the file.
-        on_damage: Told of every part that cannot be read; it may raise.
+        on_damage: Called with every part that cannot be read; it may raise.
 
     Attributes:
-        known: Schemas and channels, as far as they have been met.
-        on_damage: As it was given.
+        has_end: Whether it ends as a sound file does.
+        known: Schemas and channels, as far as they have been met, and what the summary has.
+        unproven: Whether messages were handed out that no CRC covers.
     """
 
     def __init__(self, path: Path, on_damage: Callable[[Damage], None]) -> None:
-        """Read the end of the file, where schemas and channels stand together."""
+        """Read the end of the file, where schemas and channels mostly stand together."""
         self.path = path
         self.on_damage = on_damage
         summary = read_summary(path)
-        self.has_summary = summary is not None
+        self.has_end = summary is not None
         self.known = summary or Summary(0)
-        self._sound = False
+        self.unproven = False
+        self._walked = self.known.names_all
+        self._proofs: list[bool | None] = []
+        self._data_end = 0
+        self._told = False
 
     def topics(self) -> dict[str, str]:
-        """The type of each topic by name; a file without a summary is walked for it."""
-        if not self.has_summary:
+        """The type of each topic by name; empty for one without a schema.
+
+        A file whose summary does not name them all is walked for it.
+        """
+        if not self._walked:
             for _ in self.contents():
                 pass
-        return {
-            channel.topic: self.known.schemas[channel.schema_id].name
-            for channel in self.known.channels.values()
-            if channel.schema_id in self.known.schemas
-        }
+        return {channel.topic: self.type_of(channel) for channel in self.known.channels.values()}
+
+    def type_of(self, channel: Any) -> str:
+        """The type of the messages of a channel, as mcap has it; empty where it has no schema."""
+        schema = self.known.schemas.get(channel.schema_id)
+        return str(schema.name) if schema is not None else ''
+
+    def channels_of(self, topic: str) -> list[int]:
+        """Numbers of the channels of a topic, as far as they are known."""
+        return [n for n, channel in self.known.channels.items() if channel.topic == topic]
 
     def count(self, topic: str) -> int:
         """How many messages of a topic the file says it has; 0 if it does not say."""
-        statistics = self.known.statistics
-        if statistics is None:
+        if self.known.statistics is None:
             return 0
-        numbers = [n for n, channel in self.known.channels.items() if channel.topic == topic]
-        return sum(statistics.channel_message_counts.get(number, 0) for number in numbers)
+        counts = self.known.statistics.channel_message_counts
+        return sum(counts.get(number, 0) for number in self.channels_of(topic))
 
-    def contents(self, wanted: Wanted | None = None) -> Iterator[Contents]:
+    def contents(self) -> Iterator[Contents]:
         """The messages of each sound chunk; schemas and channels are known before they come.
 
         A file may have messages outside of chunks; these come many at a time.
         """
-        loose = bytearray()
-        for found in scan(self.path, wanted):
+        loose, last = bytearray(), 0
+        for found in scan(self.path):
             if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
-                if not loose:
-                    self._trust_loose(found)
                 loose += _RECORD.pack(found.opcode, len(found.content)) + found.content
+                last = found.offset
                 if len(loose) < _LOOSE_AT_ONCE:
                     continue
             if loose:
-                yield from self._loose(bytes(loose))
+                yield from self._contents_of(Chunk(last, 0, 0, bytes(loose), {}, proven=False))
                 loose.clear()
             if isinstance(found, Chunk):
-                yield from self._opened(found)
+                yield from self._contents_of(found)
             else:
                 self._learn(found)
         if loose:
-            yield from self._loose(bytes(loose))
+            yield from self._contents_of(Chunk(last, 0, 0, bytes(loose), {}, proven=False))
+        self._walked = True
 
-    def _learn(self, found: Plain | Damage) -> None:
+    def raw_messages(self, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
+        """The messages of some topics, or of all if none is named, by the time of reception."""
+        offsets, bounds = self._bounds()
+        waiting: list[Raw] = []
+        for contents in self.contents():
+            found = self.raw_of(contents.messages, topics)
+            # Sorting keeps the order of those that were received at the same time.
+            waiting = sorted([*waiting, *found], key=lambda raw: raw.log_time)
+            bound = bounds[bisect_right(offsets, contents.offset)]
+            ready = bisect_right([raw.log_time for raw in waiting], bound)
+            yield from waiting[:ready]
+            waiting = waiting[ready:]
+        yield from waiting
+
+    def raw_of(self, messages: Messages, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
+        """Those of some messages that are of some topics, or of any if none is named."""
+        channels = {
+            number: channel
+            for number, channel in self.known.channels.items()
+            if not topics or channel.topic in topics
+        }
+        for place in np.flatnonzero(np.isin(messages.heads['channel'], list(channels))):
+            head = messages.heads[place]
+            channel = channels[int(head['channel'])]
+            yield Raw(
+                channel.topic,
+                self.type_of(channel),
+                int(head['log_time']),
+                int(head['publish_time']),
+                int(head['sequence']),
+                messages.payload(int(place)),
+                channel,
+                self.known.schemas.get(channel.schema_id),
+            )
+
+    def _bounds(self) -> tuple[list[int], list[int]]:
+        """Offsets, and the earliest log time of what follows each and the beginning, ns."""
+        offsets: list[int] = []
+        firsts: list[int] = []
+        for found in scan(self.path, chunks=False):
+            if isinstance(found, ChunkHead):
+                empty = not (found.first or found.last)
+                offsets.append(found.offset)
+                firsts.append(_LATEST if empty else found.first)
+            elif isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
+                with contextlib.suppress(struct.error):
+                    firsts.append(_LOG_TIME.unpack_from(found.content)[0])
+                    offsets.append(found.offset)
+        least = np.minimum.accumulate(np.array([*firsts, _LATEST], np.uint64)[::-1])[::-1]
+        return offsets, least.tolist()
+
+    def _learn(self, found: Found) -> None:
         """Take note of what is no message."""
         if isinstance(found, Damage):
             self.on_damage(found)
-        elif not self.has_summary and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            # No CRC covers what stands outside of chunks: only where there is nothing better.
+        elif isinstance(found, Plain) and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            # The summary has a CRC of its own: what it has is known better.
+            known = Summary(0)
             with contextlib.suppress(*_UNREADABLE):
-                add_record(self.known, found.opcode, found.content)
+                add_record(known, found.opcode, found.content)
+            self.known.schemas = known.schemas | self.known.schemas
+            self.known.channels = known.channels | self.known.channels
 
-    def _trust_loose(self, first: Plain) -> None:
-        """Messages outside of chunks have no CRC but that of the whole file, if there is one."""
-        if self.has_summary and not self._sound and not body_is_sound(self.path, self.known):
+    def prove(self) -> bool | None:
+        """Whether all data have their CRC; None where there is none, or no end of the data.
+
+        Raises:
+            OSError: If the file cannot be read.
+        """
+        if not self._proofs:
+            plain = (found for found in scan(self.path, chunks=False) if isinstance(found, Plain))
+            end = next((found for found in plain if found.opcode == Opcode.DATA_END), None)
+            (expected,) = struct.unpack('<I', end.content) if end else (0,)
+            self._data_end = end.offset - _RECORD.size if end else self.path.stat().st_size
+            sound = body_is_sound(self.path, self._data_end, expected) if expected else None
+            self._proofs.append(sound)
+        return self._proofs[0]
+
+    def _require_proof(self, offset: int) -> None:
+        """Of what has no CRC of its own, that of all data speaks, if there is one."""
+        proof = self.prove()
+        self.unproven = self.unproven or proof is None
+        if proof is False and not self._told:
+            self._told = True
             reason = 'its messages have no CRC of their own, and that of the file is another'
-            self.on_damage(Damage(self.path, first.offset, self.known.start, reason))
-        self._sound = True  # asked once
+            self.on_damage(Damage(self.path, offset, self._data_end, reason))
 
-    def _loose(self, records: bytes) -> Iterator[Contents]:
-        for contents in self._opened(Chunk(0, 0, 0, records, {})):
-            first = int(contents.messages.heads['log_time'].min())
-            yield contents._replace(first=first)
+    def contradictions(self) -> Iterator[str]:
+        """Where the summary says what is not so, as phrases."""
+        heads = [f for f in scan(self.path, chunks=False) if isinstance(f, ChunkHead)]
+        places = {place.offset for place in self.known.chunks}
+        if places and places != {head.offset for head in heads}:
+            yield 'its index does not lead to all of its chunks, and to nothing else'
+        statistics = self.known.statistics
+        if statistics is not None and statistics.chunk_count != len(heads):
+            yield f'its summary counts {statistics.chunk_count} chunks, and {len(heads)} are there'
 
     def notes(self) -> Iterator[Note]:
         """Every note, in order; one that is not as it was written is damage."""
@@ -148,25 +266,31 @@ class RecordedFile:
             yield Note(record.name, values)
 
     def attachments(self) -> Iterator[Any]:
-        """Every attachment, as mcap has it, in order."""
+        """Every attachment, as mcap has it, in order; one without its CRC is damage."""
         return self._plain(Opcode.ATTACHMENT, Attachment)
 
     def _plain(self, opcode: int, kind: Any) -> Iterator[Any]:
-        for found in scan(self.path, lambda _first, _last: False):
+        for found in scan(self.path, chunks=False):
             if isinstance(found, Plain) and found.opcode == opcode:
                 try:
+                    if opcode == Opcode.ATTACHMENT:
+                        _check_attachment(found.content)
                     yield kind.read(ReadDataStream(BytesIO(found.content)))
-                except _UNREADABLE:
+                except _UNREADABLE as error:
                     where = found.offset, found.offset + len(found.content)
-                    self.on_damage(Damage(self.path, *where, 'a note cannot be read'))
+                    what = 'an attachment' if opcode == Opcode.ATTACHMENT else 'a note'
+                    reason = str(error) if isinstance(error, _BadCrcError) else 'cannot be read'
+                    self.on_damage(Damage(self.path, *where, f'{what} {reason}'))
 
-    def _opened(self, chunk: Chunk) -> Iterator[Contents]:
+    def _contents_of(self, chunk: Chunk) -> Iterator[Contents]:
+        if not chunk.proven:
+            self._require_proof(chunk.offset)
         try:
             messages = messages_of(chunk)
             for offset in messages.others:
-                opcode, length = struct.unpack_from('<BQ', chunk.records, offset)
-                content = chunk.records[offset + 9 : offset + 9 + length]
-                add_record(self.known, opcode, content)
+                opcode, length = _RECORD.unpack_from(chunk.records, offset)
+                begin = offset + _RECORD.size
+                add_record(self.known, opcode, chunk.records[begin : begin + length])
         except _UNREADABLE as error:
             self.on_damage(Damage(self.path, chunk.offset, chunk.offset, str(error)))
             return
@@ -174,7 +298,26 @@ class RecordedFile:
         if unknown:
             reason = f'its messages of channel {min(unknown)} are of a topic that nothing names'
             self.on_damage(Damage(self.path, chunk.offset, chunk.offset, reason))
-        yield Contents(chunk.first, messages)
+        yield Contents(chunk.offset, messages)
+
+
+class _BadCrcError(ValueError):
+    """A record that is not what was written; the text is the end of a phrase."""
+
+
+def _check_attachment(content: bytes) -> None:
+    """Compare the CRC of an attachment, if it has one.
+
+    Raises:
+        ValueError: If it has another.
+    """
+    place = 16
+    for _ in range(2):  # name and media type
+        place += 4 + struct.unpack_from('<I', content, place)[0]
+    place += 8 + struct.unpack_from('<Q', content, place)[0]
+    (expected,) = struct.unpack_from('<I', content, place)
+    if expected and crc32(content[:place]) != expected:
+        raise _BadCrcError('does not have its CRC')
 
 
 def offers_of(channel: Any) -> list[dict[str, Any]]:

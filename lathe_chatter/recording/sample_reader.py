@@ -76,15 +76,14 @@ def sample_blocks(
         OSError: If the file cannot be read.
         LayoutError: If a message is no block of samples.
     """
-    numbers = [n for n, channel in file.known.channels.items() if channel.topic == topic]
+    numbers = file.channels_of(topic)
     sizes = _index_sizes(file, topic, numbers[0]) if len(numbers) == 1 else []
     if sizes:
         yield from _in_threads(file, _Extractor(file, numbers[0], sizes, wanted))
         return
     waiting: list[_Stretch] = []
     for contents in file.contents():
-        channels = [n for n, channel in file.known.channels.items() if channel.topic == topic]
-        waiting += _stretches(contents.messages.of(*channels))
+        waiting += _stretches(contents.messages.of(*file.channels_of(topic)))
         if len(waiting) >= _AT_ONCE:
             yield from _joined(waiting, wanted)
             waiting.clear()

@@ -276,8 +276,8 @@ class RunFiles:
             FileCount(name, held.first, held.last, sum(held.counts.values()))
             for name, held in self._files()
         ]
-        topics = [records.topic for records in self._topics]
-        values = describe(files, topics, self.counts, self._distribution)
+        topics = {records.topic.name: records.topic for records in self._topics}
+        values = describe(files, topics.values(), self.counts, self._distribution)
         return dump(values)
 
     def _describe(self) -> None:

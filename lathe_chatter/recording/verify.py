@@ -19,7 +19,7 @@ from lathe_chatter.recording.completeness import (
 )
 from lathe_chatter.recording.provenance import PUBLISHERS, RECEPTION, STALLS
 from lathe_chatter.recording.run import Run, read_run
-from lathe_chatter.recording.run_file import Note, RecordedFile, offers_of
+from lathe_chatter.recording.run_file import Note, offers_of
 from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification import Finding, SampleCount, Verification
 from lathe_chatter.samples.codec import SAMPLES_TYPE
@@ -61,7 +61,7 @@ def _check_messages(found: Verification, progress: Progress) -> dict[str, Number
         heads = contents.messages.heads
         for number in np.unique(heads['channel']).tolist():
             channel = file.known.channels.get(number)
-            if channel is None or channel.schema_id not in file.known.schemas:
+            if channel is None:
                 continue  # told as damage
             of_it = heads[heads['channel'] == number]
             found.messages[channel.topic] += len(of_it)
@@ -91,8 +91,8 @@ def _check_messages(found: Verification, progress: Progress) -> dict[str, Number
 def _publishers(run: Run) -> dict[str, int]:
     """How many publishers each topic had when it was found, or at most where that was noted."""
     numbers: dict[str, int] = {}
-    for path in run.files:
-        for channel in RecordedFile(path, lambda _damage: None).known.channels.values():
+    for file in run.opened:
+        for channel in file.known.channels.values():
             numbers[channel.topic] = max(len(offers_of(channel)), 1)
     for note in run.notes():
         for topic in note.values if note.name == PUBLISHERS else ():
