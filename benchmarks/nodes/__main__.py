@@ -1,6 +1,6 @@
 """The nodes' figures on this machine: CPU, lateness of the ticks, delay of a parameter.
 
-    python benchmarks/nodes [--seconds 60] [cpu] [lateness] [parameter] [lathes]
+    python benchmarks/nodes [--seconds 60] [cpu] [lateness] [parameter] [lathes] [requests]
     python benchmarks/nodes [--simulated 3600] hour
     python benchmarks/nodes [--repeats 200] repeats
 
@@ -23,6 +23,7 @@ os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 import domain_coordinator
 import figures
 import rclpy
+from answers import measure_requests
 from processes import machine
 from repeats import repeats
 
@@ -33,6 +34,7 @@ FIGURES: dict[str, Callable[[Any], None]] = {
     'lateness': lambda options: figures.measure_lateness(options.seconds),
     'parameter': lambda _options: figures.measure_parameter(),
     'lathes': lambda options: figures.measure_lathes(options.seconds),
+    'requests': lambda options: measure_requests(options.seconds / 6.0),
 }
 LONG: dict[str, Callable[[Any], None]] = {
     'hour': lambda options: figures.measure_hour(options.simulated),

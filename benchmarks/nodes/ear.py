@@ -23,10 +23,10 @@ _DEEPEST = QoSProfile(depth=20_000)
 class Ear:
     """A node that notes what comes and when it was sent."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, by_events: bool = False) -> None:
         """Begin deaf."""
         self.node = Node('benchmark')
-        self.executor = make_executor(self.node, by_events=False)
+        self.executor = make_executor(self.node, by_events=by_events)
         self.executor.add_node(self.node)
         self.heard = Continuity()
         self._decoder = SampleDecoder()
@@ -77,9 +77,9 @@ class Ear:
 
 
 @contextlib.contextmanager
-def ear() -> Iterator[Ear]:
+def ear(*, by_events: bool = False) -> Iterator[Ear]:
     """An `Ear` that is closed at the end."""
-    listener = Ear()
+    listener = Ear(by_events=by_events)
     try:
         yield listener
     finally:

@@ -12,8 +12,11 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import rclpy
+
+from lathe_chatter.nodes.node_main import make_executor
 
 LATHE = 'lathe_chatter.nodes.lathe_node'
 MONITOR = 'lathe_chatter.nodes.monitor_node'
@@ -32,6 +35,17 @@ def running(module: str, *arguments: str, cores: set[int] | None = None) -> Iter
         yield process.pid
     finally:
         process.send_signal(signal.SIGINT)
+        process.wait(30)
+
+
+@contextlib.contextmanager
+def script(name: str, *arguments: str) -> Iterator[int]:
+    """A script of this folder as a process; its process id."""
+    process = subprocess.Popen([sys.executable, str(Path(__file__).with_name(name)), *arguments])  # noqa: S603 -- our own
+    try:
+        yield process.pid
+    finally:
+        process.kill()
         process.wait(30)
 
 
@@ -78,6 +92,13 @@ def busy(count: int) -> Iterator[None]:
         for burner in burners:
             burner.kill()  # the handlers of rclpy, which a fork inherits, ignore SIGTERM
             burner.join()
+
+
+def executor_of(node: Any) -> Any:
+    """A quick executor that serves a node."""
+    executor = make_executor(node)
+    executor.add_node(node)
+    return executor
 
 
 def machine() -> str:

@@ -263,6 +263,14 @@ LATHE = ParameterTable(
             node_only=True,
         ),
         Row(
+            'clock_catch_up',
+            5.0,
+            'under use_sim_time: how late behind /clock is made up; beyond it time is not cut',
+            Quantity('', 's', low=0.1, high=3600.0),
+            run_time=True,
+            node_only=True,
+        ),
+        Row(
             'realtime_priority',
             1,
             'priority (SCHED_RR) to ask for, where permitted, while it keeps real time; 0: none',

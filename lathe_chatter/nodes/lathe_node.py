@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -16,6 +17,7 @@ from lathe_chatter.model import Cut
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
 from lathe_chatter.nodes import control, simulation_services
+from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.lathe_record import LatheRecord
@@ -30,13 +32,18 @@ from lathe_chatter.nodes.real_time import (
     ask_for_short_slices,
     spin_in_ticks,
 )
-from lathe_chatter.nodes.tick_statistics import TickStatistics
+from lathe_chatter.nodes.tick_statistics import FLOOD, TickStatistics
 from lathe_chatter.precompile import precompile
 
 _BUDGET = 5_000_000
-"""ns that a node which cuts as fast as it can takes before it looks for requests."""
-_READERS_PATIENCE = 0.1
-"""s that it then waits at most for its slowest reader; in real time it waits for nobody."""
+"""ns of ticks, or of waiting for readers, after which requests have their turn."""
+_READERS_PATIENCE = 100_000_000
+"""ns that a node which cuts as fast as it can waits at most for its slowest reader; in real time
+it waits for nobody."""
+_MAX_KNOCKS = 1000
+"""Knocks between two ticks; they come one after the other, and are applied together."""
+_CLOCK_STOPPED = 2.0
+"""s after which a /clock that shows the same time stands still."""
 _LOOK_FOR_READERS = 5_000_000
 """ns from one look to the next for the readers that it waits for."""
 
@@ -73,11 +80,13 @@ class LatheNode(ParameterNode):
         precompile()  # compiled before the first tick is due
         self._lathe = recorded_config(values).lathe()
         self._pending: Cut | None = None
+        self._knocks: list[float] = []
         self._topics = LatheTopics(
             self, values['tick_rate'], self._factor, publish_clock=values['publish_clock']
         )
         self._record = LatheRecord(self, values)
 
+        self._log = BoundedLog(QuickLog(self.get_logger()))
         self._control = RunControl()
         self._awaited: int = values['await_readers']
         if self._awaited:
@@ -86,13 +95,15 @@ class LatheNode(ParameterNode):
         tick = SECOND / values['tick_rate']
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
-        self._meter = TickStatistics(self._pacer, tick)
+        self._wait_until = 0
+        self._clock_seen, self._clock_stands = (0, 0.0), False
+        self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
         control.create_services(self)
         if simulation_services.AVAILABLE:
             simulation_services.create_services(self)
-        self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=10))
+        self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=100))
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._by_timer = by_timer or self._follows
         if self._by_timer:
@@ -135,12 +146,12 @@ class LatheNode(ParameterNode):
             return now + _LOOK_FOR_READERS
         if self._control.state is not RunState.RUNNING:
             return None
-        if self._free or self._pacer.must_start(now):
+        if self._free or not self._pacer.started:
             return now
         return self._pacer.next_wake(now)
 
     def wake(self) -> None:
-        """Make the ticks that are due."""
+        """Make the ticks that are due, or as many of them as there is time for in one go."""
         if self._awaited and self._topics.readers() >= self._awaited:
             self.announce()  # those who read samples may read events too
             self.pause(pause=False)
@@ -149,23 +160,60 @@ class LatheNode(ParameterNode):
         now = self._now()
         if self._follows and now == 0:
             return  # no /clock yet
-        if self._pacer.must_start(now):
+        if not self._pacer.started:
             self._start_clock()
+        elif self._follows:
+            self._follow(now)
         if self._free:
-            while self._now() - now < _BUDGET and self._control.state is RunState.RUNNING:
-                self._tick()
-            self._topics.wait_for_readers(_READERS_PATIENCE)
+            self._cut_freely(now)
             return
         overruns = self._pacer.overruns
-        for _ in range(self._pacer.due(now)):
-            self._tick()
+        due = self._pacer.due(now)
         self._meter.note_lateness(self._pacer.lateness(now))
+        self._make(due)
         if self._pacer.overruns != overruns:
-            self.get_logger().warning(
+            self._log.warning(
                 f'Behind: {self._pacer.lag / SECOND:.3f} s of simulated time given up so far.',
-                throttle_duration_sec=10.0,
+                'behind',
             )
             self._diagnostics.publish_changes(self._statuses())
+
+    def _make(self, ticks: int) -> None:
+        """Make ticks that are due, until the time for one go is over."""
+        until = time.monotonic_ns() + _BUDGET
+        for made in range(1, ticks + 1):
+            self._tick()
+            if time.monotonic_ns() > until:
+                self._pacer.give_back(ticks - made)
+                return
+
+    def _cut_freely(self, now: int) -> None:
+        """Cut as fast as it goes, and as the readers can take it."""
+        if now < self._wait_until and not self._topics.wait_for_readers(_BUDGET / SECOND):
+            return
+        while self._now() - now < _BUDGET and self._control.state is RunState.RUNNING:
+            self._tick()
+        self._wait_until = self._now() + _READERS_PATIENCE
+
+    def _follow(self, now: int) -> None:
+        """See that /clock goes on as a clock does; else say so, and go on from where it is."""
+        late = self._pacer.lateness(now) / SECOND
+        bound: float = self.values['clock_catch_up']  # type: ignore[assignment]  # a double
+        if self._pacer.gone_back(now):
+            self._log.warning(
+                f'/clock went back by {-late:.3f} s to {now / SECOND:.3f} s: '
+                'the cut goes on from there.',
+                'clock back',
+            )
+            self._start_clock()
+        elif late > bound:
+            self._pacer.skip(now)
+            self._log.warning(
+                f'/clock is {late:.3f} s ahead of the cut at {now / SECOND:.3f} s, more than the '
+                f'{bound:g} s of clock_catch_up: that time is not cut.',
+                'clock ahead',
+            )
+            self._start_clock()
 
     def update_scheduling(self) -> None:
         """Be scheduled in real time only while that disturbs nobody: with cores to spare."""
@@ -180,6 +228,8 @@ class LatheNode(ParameterNode):
         if self._pending is not None:
             self._retune(self._pending)
             self._pending = None
+        if self._knocks:
+            self._knock()
         samples = self._lathe.advance(self._samples_per_tick)
         if len(samples):
             self._topics.publish(samples, self._stamp())
@@ -221,12 +271,31 @@ class LatheNode(ParameterNode):
         self._record.changed(self._lathe.time, before, cut)
 
     def _on_knock(self, message: Float64) -> None:
+        """Keep a knock for the next tick; a client that knocks without end holds up nobody."""
+        began = time.monotonic_ns()
         try:
-            self._lathe.knock(message.data)
+            KNOCK.check('impulse', message.data)
         except ParameterError as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            self._log.warning(str(error), 'knock')
         else:
-            self._record.knocked(self._lathe.time, message.data)
+            if len(self._knocks) == _MAX_KNOCKS:
+                self._log.warning(
+                    f'More than {_MAX_KNOCKS} knocks between two ticks: the others are dropped.',
+                    'too many knocks',
+                )
+            else:
+                self._knocks.append(message.data)
+        self.requests.note(began)
+
+    def _knock(self) -> None:
+        """Hit the tool with all that came since the last tick: impulses add up."""
+        impulse, self._knocks = math.fsum(self._knocks), []
+        try:
+            self._lathe.knock(impulse)
+        except ParameterError as error:
+            self._log.warning(str(error), 'knock')
+        else:
+            self._record.knocked(self._lathe.time, impulse)
 
     # -- control ---------------------------------------------------------------------------
 
@@ -261,7 +330,7 @@ class LatheNode(ParameterNode):
     def reset(self) -> Answer:
         """Start again at time zero with the present parameters: the same run, bit for bit."""
         answer = self._control.reset()
-        self._pending = None
+        self._pending, self._knocks = None, []
         before, self._lathe = self._lathe, recorded_config(self.values).lathe()
         self._record.restarted(before.time, before.cut, self._lathe.cut)
         self._start_clock()
@@ -275,16 +344,28 @@ class LatheNode(ParameterNode):
     # -- diagnostics -----------------------------------------------------------------------
 
     def _report(self) -> None:
+        self._watch_clock()
+        share = self._meter.requests_share
+        if share > FLOOD:
+            self._log.warning(
+                f'Requests take {share:.0%} of the time: {self._meter.requests_served} in the '
+                'last second.',
+                'flood',
+            )
         self._diagnostics.publish(self._statuses())
+        self._log.look()
         self._meter.begin_second()
         if self._control.state is not RunState.RUNNING:
             self._topics.publish_clock(self._stamp())  # for those that join a clock at rest
 
     def _statuses(self) -> list[Status]:
+        running = self._control.state is RunState.RUNNING and not self._free
+        late = self._pacer.lateness(self._now()) - self._pacer.period if running else 0.0
         return [
             self._meter.pace(
                 self._control,
                 asked=self._factor,
+                late=max(late, 0.0) / SECOND,
                 clock=self._clock_complaint(),
                 scheduling=self._real_time.word,
             ),
@@ -299,7 +380,27 @@ class LatheNode(ParameterNode):
             return 'waiting for /clock'
         if (self._follows or self.values['publish_clock']) and owners > 1:
             return f'{owners} nodes publish /clock: it must have one owner'
+        if self._clock_stands:
+            return '/clock stands still'
         return ''
+
+    def _watch_clock(self) -> None:
+        """See whether a /clock that is followed goes on; called once a second."""
+        if not self._follows:
+            return
+        now, at = self._now(), time.monotonic()
+        if now != self._clock_seen[0]:
+            self._clock_seen, stands = (now, at), False
+        else:
+            stands = at - self._clock_seen[1] >= _CLOCK_STOPPED
+        if stands and not self._clock_stands and now:
+            self._log.warning(
+                f'/clock stands still at {now / SECOND:.3f} s, and the cut with it.',
+                'clock stands',
+            )
+        elif self._clock_stands and not stands:
+            self._log.info(f'/clock goes on at {now / SECOND:.3f} s.', 'clock goes on')
+        self._clock_stands = stands
 
 
 def main() -> None:

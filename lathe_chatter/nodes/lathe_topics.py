@@ -99,9 +99,9 @@ class LatheTopics:
         """How many readers of the samples the publisher has met: they miss none from now on."""
         return int(self._samples.get_subscription_count())
 
-    def wait_for_readers(self, patience: float) -> None:
-        """Wait until every reader has the samples, `patience` s at most."""
-        self._samples.wait_for_all_acked(Duration(seconds=patience))
+    def wait_for_readers(self, patience: float) -> bool:
+        """Wait until every reader has the samples, `patience` s at most; whether they have."""
+        return bool(self._samples.wait_for_all_acked(Duration(seconds=patience)))
 
     def publish_clock(self, stamp: int) -> None:
         """Publish simulated time, ns, if this node drives the clock."""

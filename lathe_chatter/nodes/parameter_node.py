@@ -6,6 +6,7 @@ double), on-set validates without side effects, post-set hands over what was acc
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -17,6 +18,7 @@ from rclpy.parameter import Parameter
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
+from lathe_chatter.nodes.real_time import RequestLoad
 
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 _OF_QOS = 'qos_overrides.'
@@ -45,6 +47,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         # rclpy's own declaration would end a wrong override in a traceback that says neither
         # unit nor limits. Declared from the overrides first, without type or range, they can be
         # read, checked by the table, and declared again as the table has them.
+        self.requests = RequestLoad()
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
         self._table = table
         self._values = table.complete(self._take_overrides())
@@ -109,14 +112,24 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
     def create_service(
         self, srv_type: Any, srv_name: str, callback: Callable[..., Any], **options: Any
     ) -> Any:
-        """Create a service; those that set parameters survive a type that ROS does not know.
+        """Create a service, whose requests are counted in `requests`.
+
+        Those that set parameters survive a type that ROS does not know.
 
         rclpy raises ValueError on it inside the callback, which would end the node. Without a
         value it is refused as any other wrong value.
         """
         if srv_type in _SET_SERVICES:
             callback = _without_unknown_types(callback)
-        return super().create_service(srv_type, srv_name, callback, **options)
+
+        def serve(request: Any, response: Any) -> Any:
+            began = time.monotonic_ns()
+            try:
+                return callback(request, response)
+            finally:
+                self.requests.note(began)
+
+        return super().create_service(srv_type, srv_name, serve, **options)
 
     def _take_overrides(self) -> dict[str, object]:
         """Undeclare everything that the overrides declared, and return it."""

@@ -7,6 +7,7 @@ counted as lag and reported.
 The loop: an executor costs ten times as much as a tick of the lathe, and hands a timer from
 thread to thread before it fires. So the loop sleeps by itself until the next tick, and lets the
 executor look for requests only every few ticks; where one was waiting, after the very next tick.
+Where ticks leave no time, requests get as much of it as the ticks had, and no more.
 
 Scheduling: Linux shares a core fairly, but a task that wakes may wait while others finish their
 slices, a few ms. Since 6.12 a task may ask for slices of its own that are short, and is then
@@ -35,7 +36,9 @@ LOOK_UP = 0.1
 SERVE_PERIOD = 10_000_000
 """ns after which the executor looks for requests that nobody knows of."""
 _MARGIN = 500_000
-"""ns before the next tick in which the executor is not asked any more: it may come back late."""
+"""ns before the next tick in which the executor does not wait any more: it may come back late."""
+_LEAST_SHARE = 1_000_000
+"""ns that requests may take where the ticks since the last of them took less."""
 _SET_ATTRIBUTES = {'x86_64': 314, 'aarch64': 274}
 _SLICE = 100_000
 """ns, the shortest that Linux gives."""
@@ -73,9 +76,22 @@ class Pacer:
         """Let the next tick be due one period from now: at first, and after a pause."""
         self._origin, self._done = now, 0
 
-    def must_start(self, now: int) -> bool:
-        """Whether it was never started, or the clock has gone back and so has started again."""
-        return self._origin is None or self.lateness(now) < -self.period
+    @property
+    def started(self) -> bool:
+        """Whether it was ever started."""
+        return self._origin is not None
+
+    def gone_back(self, now: int) -> bool:
+        """Whether the clock has gone back, and so has to be started again."""
+        return self.lateness(now) < -self.period
+
+    def skip(self, now: int) -> float:
+        """Give up all that is due: the clock has jumped; how much that was, ns of the clock."""
+        skipped = self.lateness(now)
+        self.lag += skipped
+        self.overruns += 1
+        self.start(now)
+        return skipped
 
     def change(self, factor: float, now: int) -> None:
         """Go on with another factor, as late as it is."""
@@ -102,24 +118,45 @@ class Pacer:
         self._done += ticks
         return ticks
 
+    def give_back(self, ticks: int) -> None:
+        """Let ticks that were due, and counted as made, be due again: there was no time."""
+        self._done -= ticks
+
     def next_wake(self, now: int) -> int:
         """When to call next: when the next tick is due, but no sooner than after a tick's time.
 
         At a factor above 1 several ticks are made in one go.
         """
-        if self.factor > 1.0:
-            return now + int(self.tick)
-        return now - int(self.lateness(now) - self.period)
+        return now - int(self.lateness(now) - max(self.period, self.tick))
 
     def lateness(self, now: int) -> float:
         """How long ago the last tick that was made had been due, ns; negative if it is early."""
         return 0.0 if self._origin is None else now - self._origin - self._done * self.period
 
 
+@dataclass
+class RequestLoad:
+    """What its clients ask of a node, and what it takes.
+
+    Attributes:
+        served: Requests since the start.
+        taken: Their time, ns.
+    """
+
+    served: int = 0
+    taken: int = 0
+
+    def note(self, began: int) -> None:
+        """Note a request whose answer was begun at `began`, ns of time.monotonic_ns()."""
+        self.served += 1
+        self.taken += time.monotonic_ns() - began
+
+
 class Tickable(Protocol):
     """A node of rclpy with a task at set times."""
 
     context: Context
+    requests: RequestLoad
 
     def next_wake(self) -> int | None:
         """When `wake` wants to be called, ns of time.monotonic_ns(); None for not by time."""
@@ -146,7 +183,7 @@ def spin_in_ticks(
         serve_period: ns after which the executor looks for requests that nobody knows of.
     """
     executor.add_node(node)
-    serve_at = 0
+    serve_at = spent = 0
     try:
         while node.context.ok() and not ended():
             wake_at = node.next_wake()
@@ -155,27 +192,39 @@ def spin_in_ticks(
                 continue
             now = time.monotonic_ns()
             if now >= serve_at:
-                busy = _serve(executor, now, wake_at - _MARGIN)
+                busy = _serve(executor, node.requests, wake_at - _MARGIN, spent)
                 serve_at = 0 if busy else now + serve_period
+                spent = 0
                 node.update_scheduling()
-            left = wake_at - time.monotonic_ns()
-            if left > 0:
-                time.sleep(left / SECOND)
+            now = time.monotonic_ns()
+            if wake_at > now:
+                time.sleep((wake_at - now) / SECOND)
+            began = time.monotonic_ns()
             node.wake()
+            spent += time.monotonic_ns() - began
     finally:
         executor.remove_node(node)
         executor.shutdown()
 
 
-def _serve(executor: Executor, now: int, until: int) -> bool:
-    """Serve what waits, and what comes in a while; whether anything did."""
-    left = max(until - now, 0)
-    executor.spin_once(timeout_sec=left / SECOND)
-    busy = False
-    while (now := time.monotonic_ns()) < until:
-        busy = True
-        executor.spin_once(timeout_sec=(until - now) / SECOND)
-    return busy
+def _serve(executor: Executor, requests: RequestLoad, until: int, spent: int) -> bool:
+    """Serve what waits, and what comes in a while; whether anything did.
+
+    Args:
+        executor: Serves one request at a time.
+        requests: Counts them.
+        until: When the next tick wants to be made, ns of time.monotonic_ns().
+        spent: What the ticks have had since requests were served last, ns: their share, too.
+    """
+    first = before = requests.served
+    now = time.monotonic_ns()
+    share_ends = now + max(spent, _LEAST_SHARE)
+    while True:
+        executor.spin_once(timeout_sec=max(until - now, 0) / SECOND)
+        now = time.monotonic_ns()
+        if now >= until and (requests.served == before or now >= share_ends):
+            return requests.served != first
+        before = requests.served
 
 
 class RealTime:

@@ -10,11 +10,15 @@ import numpy as np
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.nodes.control import RunControl, RunState
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
-from lathe_chatter.nodes.real_time import SECOND, Pacer
+from lathe_chatter.nodes.real_time import SECOND, Pacer, RequestLoad
 
 _MICRO = 1e-3
 """us in a ns."""
 _LATEST = 4096
+FLOOD = 0.25
+"""Fraction of the time that requests take when they are called a flood."""
+_LATE = 0.1
+"""s behind the clock from which a node no longer keeps up."""
 
 
 class Durations:
@@ -46,6 +50,8 @@ class _Mark(NamedTuple):
     ticks: int
     overruns: int
     lag: float
+    served: int
+    taken: int
     at: int
 
 
@@ -55,11 +61,12 @@ class TickStatistics:
     Args:
         pacer: Whose lag is reported.
         tick: Simulated duration of a tick, ns.
+        requests: That are served beside the ticks.
     """
 
-    def __init__(self, pacer: Pacer, tick: float) -> None:
+    def __init__(self, pacer: Pacer, tick: float, requests: RequestLoad) -> None:
         """Begin at no ticks."""
-        self._pacer = pacer
+        self._pacer, self._requests = pacer, requests
         self._tick = tick
         self.ticks = 0
         self._steps = Durations()
@@ -85,28 +92,40 @@ class TickStatistics:
     def begin_second(self) -> None:
         """Forget what belonged to the second that was reported."""
         now = time.monotonic_ns()
-        self._before = _Mark(self.ticks, self._pacer.overruns, self._pacer.lag, now)
+        requests = self._requests
+        self._before = _Mark(
+            self.ticks, self._pacer.overruns, self._pacer.lag, requests.served, requests.taken, now
+        )
         self._steps.clear()
         self._lateness.clear()
         self._engaged = self._in_cut = 0
 
-    def pace(self, control: RunControl, *, asked: float, clock: str, scheduling: str) -> Status:
+    @property
+    def requests_share(self) -> float:
+        """What requests took of the time in this second, as a fraction."""
+        elapsed = max(1, time.monotonic_ns() - self._before.at)
+        return (self._requests.taken - self._before.taken) / elapsed
+
+    @property
+    def requests_served(self) -> int:
+        """How many requests were served in this second."""
+        return self._requests.served - self._before.served
+
+    def pace(
+        self, control: RunControl, *, asked: float, late: float, clock: str, scheduling: str
+    ) -> Status:
         """The status of the pace.
 
         Args:
             control: Whether time goes on.
             asked: The real-time factor asked for, 0 for as fast as possible.
+            late: How late the last tick is that should have been made by now, s.
             clock: What is wrong with /clock; empty if nothing is.
             scheduling: Of the thread that ticks.
         """
         elapsed = max(1, time.monotonic_ns() - self._before.at)
         reached = (self.ticks - self._before.ticks) * self._tick / elapsed
-        behind = self.behind
-        message = 'as fast as possible' if asked == 0.0 else 'keeping up'
-        if control.state is not RunState.RUNNING:
-            message = control.state.value
-        if behind:
-            message = 'behind: simulated time was given up'
+        level, message = self._verdict(control, asked, late, clock)
         p50, p99, largest = (q * _MICRO for q in self._steps.quantiles(0.5, 0.99, 1.0))
         late99, latest = (q * _MICRO for q in self._lateness.quantiles(0.99, 1.0))
         values = {
@@ -121,9 +140,30 @@ class TickStatistics:
             'step time max, us': largest,
             'lateness p99, us': late99,
             'lateness max, us': latest,
+            'behind the clock, s': late,
+            'requests in the last second': self.requests_served,
+            'time taken by requests, fraction': self.requests_share,
             'scheduling': scheduling,
         }
-        return Status('pace', WARN if behind or clock else OK, clock or message, values)
+        return Status('pace', level, message, values)
+
+    def _verdict(
+        self, control: RunControl, asked: float, late: float, clock: str
+    ) -> tuple[bytes, str]:
+        """Level and message of the pace: what is wrong first."""
+        running = control.state is RunState.RUNNING
+        wrong = (
+            (bool(clock), clock),
+            (self.behind, 'behind: simulated time was given up'),
+            (self.requests_share > FLOOD, 'flooded: requests take much of the time'),
+            (running and late > _LATE, 'catching up'),
+        )
+        for holds, message in wrong:
+            if holds:
+                return WARN, message
+        if not running:
+            return OK, control.state.value
+        return OK, 'as fast as possible' if asked == 0.0 else 'keeping up'
 
     def cutting(self, control: RunControl, lathe: VirtualLathe) -> Status:
         """The status of the cut."""

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
-from lathe_chatter.nodes.bounded_log import BURST, MAX_KINDS, PERIOD, BoundedLog
+from lathe_chatter.nodes.bounded_log import BURST, MAX_KINDS, PERIOD, BoundedLog, QuickLog
 
 
-class Lines:
-    """Where a log goes."""
+class Lines(QuickLog):
+    """Where a log goes, with the time that it is."""
 
     def __init__(self) -> None:
-        self.info: object = lambda text: self.lines.append(('info', text))
-        self.warning: object = lambda text: self.lines.append(('warning', text))
-        self.error: object = lambda text: self.lines.append(('error', text))
+        super().__init__(None)
         self.lines: list[tuple[str, str]] = []
         self.time = 100.0
+
+    def log(self, severity: Any, sentence: str) -> None:
+        self.lines.append((severity.name, sentence))
 
     def now(self) -> float:
         return self.time
@@ -42,7 +44,7 @@ def test_a_flood_is_a_burst_and_then_one_line_a_period_that_counts_the_rest() ->
 
 def test_the_last_word_of_a_flood_is_told() -> None:
     out, poured = flooded(seconds=3, rate=100)
-    assert out.lines[-1][0] == 'warning'
+    assert out.lines[-1][0] == 'WARN'
     assert out.lines[-1][1].startswith(f'{poured - 1} samples are missing. (')
 
 
@@ -52,7 +54,7 @@ def test_kinds_do_not_hold_each_other_back() -> None:
     for _ in range(100):
         bounded.info('the same')
     bounded.error('another')
-    assert out.lines == [('info', 'the same')] * BURST + [('error', 'another')]
+    assert out.lines == [('INFO', 'the same')] * BURST + [('ERROR', 'another')]
 
 
 def test_after_a_quiet_period_a_kind_begins_anew() -> None:
