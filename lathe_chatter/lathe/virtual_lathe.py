@@ -19,7 +19,7 @@ from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity, count_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
-_IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
+IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
 
 
 class EventKind(IntEnum):
@@ -211,7 +211,7 @@ class VirtualLathe:
         Raises:
             ParameterError: If it is not finite or beyond 1000 N s.
         """
-        self._state.knock(_IMPULSE.check('impulse', impulse))
+        self._state.knock(IMPULSE.check('impulse', impulse))
 
     def snapshot(self) -> LatheState:
         """A copy of everything that the lathe remembers; `LatheState.save` puts it in a file."""

@@ -18,8 +18,6 @@ MAX_KINDS = 1000
 """Kinds that are kept apart; what comes under a new name beyond them is one kind."""
 
 
-
-
 class QuickLog:
     """The log of a node, without rclpy's search for the line of code that calls.
 

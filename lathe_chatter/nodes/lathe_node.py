@@ -13,6 +13,7 @@ from std_msgs.msg import Float64
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import recorded_config
+from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model import Cut
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
@@ -103,7 +104,7 @@ class LatheNode(ParameterNode):
         control.create_services(self)
         if simulation_services.AVAILABLE:
             simulation_services.create_services(self)
-        self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=100))
+        self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=_MAX_KNOCKS))
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._by_timer = by_timer or self._follows
         if self._by_timer:
@@ -274,7 +275,7 @@ class LatheNode(ParameterNode):
         """Keep a knock for the next tick; a client that knocks without end holds up nobody."""
         began = time.monotonic_ns()
         try:
-            KNOCK.check('impulse', message.data)
+            IMPULSE.check('impulse', message.data)
         except ParameterError as error:
             self._log.warning(str(error), 'knock')
         else:
@@ -285,6 +286,8 @@ class LatheNode(ParameterNode):
                 )
             else:
                 self._knocks.append(message.data)
+            if self._control.state is RunState.PAUSED:
+                self._knock()
         self.requests.note(began)
 
     def _knock(self) -> None:

@@ -18,6 +18,7 @@ from lathe_chatter.lathe.cut_events import (
     knock_sentence,
 )
 from lathe_chatter.model import Cut
+from lathe_chatter.nodes.bounded_log import QuickLog
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
 from lathe_chatter.recording import LatheRun
 
@@ -41,7 +42,7 @@ class LatheRecord:
 
     def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
         """Begin, at time zero."""
-        self._logger = node.get_logger()
+        self._logger = QuickLog(node.get_logger())
         self._run: LatheRun | None = None
         self._folder, self._failure = values['record'], ''
         if self._folder:
