@@ -31,6 +31,7 @@ setup(
     ],
     # A run in other hands; each is asked for only where it is used.
     extras_require={
+        'identify': ['pyuff', 'sdypy-EMA'],  # universal files, and first poles of a tap test
         'export': ['pyarrow', 'pandas', 'xarray'],
     },
     data_files=[

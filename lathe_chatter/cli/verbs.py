@@ -11,6 +11,7 @@ from typing import Protocol
 from lathe_chatter.cli import (
     bench,
     export,
+    identify,
     knock_map,
     lobes,
     recover,
@@ -43,6 +44,7 @@ VERBS: tuple[Verb, ...] = (
     reproduce,
     lobes,
     knock_map,
+    identify,
     verify,
     recover,
     export,

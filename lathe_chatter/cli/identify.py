@@ -1,0 +1,162 @@
+"""`lathe-chatter identify`: a tap test to a machine file, with standard errors and a picture."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lathe_chatter.cli.common_options import add_json
+from lathe_chatter.cli.console import Screen, writing
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.model import Machine, Mode
+from lathe_chatter.model.cut import BearingContact
+from lathe_chatter.model.machine import Structure
+from lathe_chatter.model.machine_file import MachineDescription, load_machine
+from lathe_chatter.model.uncertainty import Uncertainty
+from lathe_chatter.tap_test import ModalFit, fit_modes, read_frequency_responses
+
+NAME = 'identify'
+HELP = 'make a machine file from tap tests: the modes of tool and workpiece, and how sure they are'
+EXAMPLE = 'lathe-chatter identify tool=tool.uff workpiece=shaft.csv --output machine.yaml'
+
+_BODIES = ('tool', 'workpiece')
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        'files', nargs='+', metavar='BODY=FILE', type=_body_and_file,
+        help='frequency responses of tool or workpiece where it cuts: universal files '
+        '(dataset 58) or CSV; one body may have several, of the same point',
+    )  # fmt: skip
+    parser.add_argument(
+        '--output', type=Path, required=True, metavar='FILE',
+        help='machine file to write; the picture of the fit is written beside it',
+    )  # fmt: skip
+    parser.add_argument(
+        '--machine', metavar='FILE',
+        help='machine file that gives what is not identified (default: none; then the bearing '
+        'has no clearance and the material is the one of the paper)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--modes', nargs='*', default=[], metavar='BODY=N', type=_body_and_count,
+        help='number of modes (default: found)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--from', dest='low', type=float, default=0.0, metavar='HZ', help='lowest frequency used'
+    )
+    parser.add_argument(
+        '--to', dest='high', type=float, default=math.inf, metavar='HZ',
+        help='highest frequency used',
+    )  # fmt: skip
+    parser.add_argument('--force', action='store_true', help='write over what is there')
+    add_json(parser)
+
+
+def _body_and_file(text: str) -> tuple[str, Path]:
+    body, _, file = text.partition('=')
+    if body not in _BODIES or not file:
+        raise argparse.ArgumentTypeError(f'{text!r} must be tool=FILE or workpiece=FILE')
+    return body, Path(file)
+
+
+def _body_and_count(text: str) -> tuple[str, int]:
+    body, _, count = text.partition('=')
+    if body not in _BODIES or not count.isdigit():
+        raise argparse.ArgumentTypeError(f'{text!r} must be tool=N or workpiece=N')
+    return body, int(count)
+
+
+def run(options: Namespace) -> int:
+    """Fit, write and print."""
+    screen = Screen(json=options.json)
+    output: Path = options.output
+    picture = output.with_suffix('.png')
+    if output.exists() and not options.force:
+        raise ParameterError('--output', str(output), '', 'a new file, or with --force any')
+    base = _base(options.machine)
+    fits: dict[str, ModalFit] = {}
+    with screen.working('Fitting the modes ...'):
+        for body in _BODIES:
+            files = [file for name, file in options.files if name == body]
+            if files:
+                responses = [r for file in files for r in read_frequency_responses(file)]
+                fits[body] = fit_modes(
+                    responses,
+                    modes=dict(options.modes).get(body),
+                    lowest_frequency=options.low,
+                    highest_frequency=options.high,
+                )
+    described = _described(base, fits)
+    with writing(output):
+        described.save(output)
+    from lathe_chatter.report.modal_fit import draw_fits
+
+    with writing(picture):
+        draw_fits(fits, picture)
+    _show(screen, fits)
+    screen.name_file('machine', output)
+    screen.name_file('picture', picture)
+    screen.json({'machine': output, 'picture': picture, 'modes': {
+        body: [{**_figures(mode), 'errors': dict(zip(_FIGURES, mode.errors, strict=True))}
+               for mode in fit.modes] for body, fit in fits.items()},
+        'warnings': [said for fit in fits.values() for said in fit.warnings]})  # fmt: skip
+    return 0
+
+
+_FIGURES = ('frequency', 'damping_ratio', 'stiffness')
+
+
+def _figures(mode: object) -> dict[str, float]:
+    return {name: getattr(mode, name) for name in _FIGURES}
+
+
+def _base(source: str | None) -> MachineDescription:
+    """What is not identified: of a file, or a machine without bearing clearance."""
+    if source is not None:
+        return load_machine(source)
+    described = MachineDescription()
+    cut = described.cut.with_changes(bearing_contact=BearingContact.NONE)
+    return replace(described, cut=cut)
+
+
+def _described(base: MachineDescription, fits: dict[str, ModalFit]) -> MachineDescription:
+    """The base with the identified modes and their covariance."""
+    known = base.uncertainty or Uncertainty()
+    bodies: dict[str, Any] = {}
+    for body, fit in fits.items():
+        modes = tuple(
+            Mode(mode.mass, 2.0 * math.pi * mode.frequency, mode.damping_ratio)
+            for mode in fit.modes
+        )
+        bodies[body] = modes[0] if len(modes) == 1 else Structure(modes)
+        known = known.with_covariance(body, len(modes), fit.covariance)
+    machine: Machine = replace(base.machine, **bodies)
+    return replace(base, machine=machine, uncertainty=known)
+
+
+def _show(screen: Screen, fits: dict[str, ModalFit]) -> None:
+    rows: list[Sequence[str]] = []
+    for body, fit in fits.items():
+        for mode in fit.modes:
+            f, z, k = mode.errors
+            rows.append((
+                body,
+                f'{mode.frequency:.4f} ± {f:.2g}',
+                f'{100.0 * mode.damping_ratio:.4f} ± {100.0 * z:.2g}',
+                f'{mode.stiffness * 1e-6:.5g} ± {k * 1e-6:.2g}',
+                f'{mode.mass:.4g}',
+            ))  # fmt: skip
+    titles = ('body', 'frequency / Hz', 'damping / %', 'stiffness / (N/µm)', 'mass / kg')
+    screen.table(
+        {title: 'left' if k == 0 else 'right' for k, title in enumerate(titles)}, rows,
+        'Modes, each figure ± its standard error:',
+    )  # fmt: skip
+    for body, fit in fits.items():
+        for said in fit.warnings:
+            screen.say(f'WARNING  {body}: {said}')

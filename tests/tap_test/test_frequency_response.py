@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.tap_tests import tap_test
+
+from lathe_chatter.tap_test import (
+    FrequencyResponse,
+    FrequencyResponseError,
+    read_frequency_responses,
+)
+
+
+def write_csv(path: Path, head: str, *columns: np.ndarray, separator: str = ',') -> Path:
+    rows = (separator.join(f'{value:.17g}' for value in row) for row in zip(*columns, strict=True))
+    path.write_text('\n'.join((head, *rows)) + '\n', encoding='utf-8')
+    return path
+
+
+@pytest.mark.parametrize(
+    ('unit', 'form', 'scale'),
+    [
+        ('m/N', 'receptance', 1.0),
+        ('um/N', 'receptance', 1e6),
+        ('µm/N', 'receptance', 1e6),
+        ('mm/s/N', 'mobility', 1e3),
+        ('m/s2/N', 'accelerance', 1.0),
+        ('m/s²/kN', 'accelerance', 1e3),
+        ('g/N', 'accelerance', 1.0 / 9.80665),
+        ('g/lbf', 'accelerance', 4.4482216152605 / 9.80665),
+    ],
+)
+def test_every_unit_comes_to_si(tmp_path: Path, unit: str, form: str, scale: float) -> None:
+    truth = tap_test(floor=0.01, form=form)
+    file = write_csv(
+        tmp_path / 'test.csv', f'frequency (Hz), real ({unit}), imaginary ({unit}), coherence',
+        truth.frequency, truth.response.real * scale, truth.response.imag * scale,
+        truth.coherence,
+    )  # fmt: skip
+    (found,) = read_frequency_responses(file)
+    assert found.form == form
+    np.testing.assert_allclose(found.response, truth.response, rtol=1e-12)
+    np.testing.assert_allclose(found.coherence, truth.coherence, rtol=1e-15)
+
+
+def test_magnitude_and_phase_with_semicolons(tmp_path: Path) -> None:
+    truth = tap_test()
+    file = write_csv(
+        tmp_path / 'test.csv', 'Frequency (rad/s);Magnitude (m/N);Phase (deg)',
+        truth.frequency * 2.0 * np.pi, np.abs(truth.response),
+        np.degrees(np.angle(truth.response)), separator=';',
+    )  # fmt: skip
+    (found,) = read_frequency_responses(file)
+    np.testing.assert_allclose(found.response, truth.response, rtol=1e-12)
+    np.testing.assert_allclose(found.frequency, truth.frequency, rtol=1e-12)
+    assert found.coherence is None
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('', 'empty'),
+        ('a,b,c\n1,2,3\n', 'no frequency'),
+        ('frequency (Hz),real (m/N)\n1,2\n', 'no imaginary'),
+        ('frequency (Hz),real (kg),imaginary (kg)\n1,2,3\n', "'kg'"),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,x\n', "'x'"),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n', 'at least 16'),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2\n1,2,3\n', 'test.csv'),
+    ],
+)
+def test_a_csv_that_cannot_be_used_is_a_sentence(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / 'test.csv'
+    file.write_text(text)
+    with pytest.raises(FrequencyResponseError) as mistake:
+        read_frequency_responses(file)
+    assert said in str(mistake.value)
+    assert '\n' not in str(mistake.value)
+
+
+def test_a_file_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(FrequencyResponseError, match='cannot be read'):
+        read_frequency_responses(tmp_path / 'nothing.uff')
+
+
+def write_universal(path: Path, truth: FrequencyResponse, binary: bool, **more: object) -> Path:
+    pyuff = pytest.importorskip('pyuff', reason='the extra `identify` is not installed')
+    common = {
+        'binary': int(binary), 'rsp_node': 1, 'rsp_dir': 3, 'ref_node': 1, 'ref_dir': 3,
+        'x': truth.frequency, 'id1': 'tip', 'rsp_ent_name': 'tool', 'ref_ent_name': 'tool',
+        'abscissa_spacing': 1, 'abscissa_spec_data_type': 18, 'orddenom_spec_data_type': 13,
+    }  # fmt: skip
+    file = pyuff.UFF(str(path))
+    response = {'func_type': 4, 'data': truth.response, 'ordinate_spec_data_type': 8, **more}
+    file.write_sets(pyuff.prepare_58(**common, **response), 'add')
+    if truth.coherence is not None:
+        file.write_sets(pyuff.prepare_58(**common, func_type=6, data=truth.coherence), 'add')
+    return path
+
+
+@pytest.mark.parametrize('binary', [False, True])
+def test_a_universal_file_with_its_coherence(tmp_path: Path, binary: bool) -> None:
+    truth = tap_test(floor=0.01)
+    (found,) = read_frequency_responses(write_universal(tmp_path / 'a.uff', truth, binary))
+    assert found.form == 'receptance'
+    np.testing.assert_allclose(found.response, truth.response, rtol=1e-8)
+    assert found.coherence is not None
+    np.testing.assert_allclose(found.coherence, truth.coherence, atol=1e-6)
+
+
+def test_a_universal_file_in_g_over_newton(tmp_path: Path) -> None:
+    truth = tap_test(floor=0.01, form='accelerance')
+    in_g = FrequencyResponse(truth.frequency, truth.response / 9.80665, 'accelerance')
+    labels = {'ordinate_spec_data_type': 12, 'ordinate_axis_units_lab': 'g',
+              'orddenom_axis_units_lab': 'N'}  # fmt: skip
+    (found,) = read_frequency_responses(
+        write_universal(tmp_path / 'a.unv', in_g, binary=False, **labels)
+    )
+    assert found.form == 'accelerance'
+    np.testing.assert_allclose(found.response, truth.response, rtol=1e-8)
+
+
+def test_what_only_looks_like_a_universal_file_is_a_sentence(tmp_path: Path) -> None:
+    pytest.importorskip('pyuff', reason='the extra `identify` is not installed')
+    file = tmp_path / 'a.uff'
+    file.write_text('    -1\n    58\nnothing more')
+    with pytest.raises(FrequencyResponseError, match=r'a\.uff'):
+        read_frequency_responses(file)
