@@ -27,6 +27,7 @@ BASE = {'arrays', 'compiled', 'errors', 'html_table', 'plot_style'}
 ARROWS = {
     'model': set(),
     'samples': set(),
+    'tap_test': set(),
     'lathe': {'model', 'samples'},
     'stability': {'model'},
     'detection': {'model', 'stability'},
@@ -34,14 +35,14 @@ ARROWS = {
     'precompile': {'model', 'samples', 'lathe', 'detection'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'samples', 'lathe', 'detection', 'recording'},
-    'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording'},
+    'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'nodes': {
         *('model', 'samples', 'lathe', 'detection', 'recording', 'scenario', 'precompile'),
     },
     'cli': {
         *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'precompile'),
-        *('recording', 'scenario', 'report', 'paper', 'nodes'),
+        *('recording', 'scenario', 'report', 'paper', 'nodes', 'tap_test'),
     },
 }
 """The packages from the bottom to the top, each with those below that it may use."""
