@@ -64,7 +64,7 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
         'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and '
         'as the rightmost characteristic root has them, of the machine open and on its bearing.'
     )
-    for sentence in _gap_sentences(history):
+    for sentence in (*_gap_sentences(history), *history.remarks):
         screen.say(sentence)
     excerpts = excerpts_of(history)
     folder = history.path if history.path.is_dir() else history.path.parent
@@ -78,14 +78,15 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
         'picture': picture,
         'occurrences': occurrences,
         'gaps': history.samples.gaps,
-        'restarts': history.samples.restarts,
+        'sessions': [session.time for session in history.sessions],
+        'remarks': history.remarks,
         'moments': [_excerpt_figures(excerpt) for excerpt in excerpts],
     }
 
 
 def _gap_sentences(history: History) -> Iterator[str]:
     """What the pictures leave out, in words."""
-    gaps, restarts = history.samples.gaps, history.samples.restarts
+    gaps = history.samples.gaps
     if gaps:
         before, after = max(gaps, key=lambda gap: gap[1] - gap[0])
         yield (
@@ -93,12 +94,10 @@ def _gap_sentences(history: History) -> Iterator[str]:
             f'{before:.6f} s to {after:.6f} s: lines end there, and nothing is '
             'computed across them.'
         )
-    if restarts:
-        before, after = restarts[0]
+    if history.later_sessions:
         yield (
-            f'The simulated time went back {_counted(len(restarts), "time")}, first from '
-            f'{before:.6f} s to {after:.6f} s: the lathe started again, '
-            'and the pictures show one cut over the other.'
+            f'The simulated time went back to zero {_counted(len(history.later_sessions), "time")}'
+            ': here the times go on, from one cut to the next.'
         )
 
 
@@ -133,6 +132,9 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
     # The start itself has no sample.
     begin, word = (0.0, 'start') if history.begin < _LATE else (history.begin, 'record begins')
     result = [_entry(history, begin, f'{word}: {_cut_text(history.cut_at(begin))}')]
+    for session in history.later_sessions:
+        cut = _cut_text(session.start) if session.known else 'with what is not in the record'
+        result.append(_entry(history, session.time, f'{session.why}: {cut}'))
     for change in history.changes:
         words = ', '.join(on_the_shop_floor(*changed) for changed in change.new.items())
         result.append(_entry(history, change.time, words))
@@ -176,15 +178,15 @@ def _advice(history: History) -> Iterator[tuple[float, float]]:
 
 def _entry(history: History, time: float, what: str) -> dict[str, Any]:
     """One occurrence with the characteristic roots of the cut in force then."""
-    cut = history.cut_at(time)
+    cut, session = history.cut_at(time), history.session_at(time)
     roots: dict[str, dict[str, float | None]] = {}
     for regime, seated in (('open', False), ('seated', True)):
         # A machine without clearance in its model has no bearing to rest on.
-        if seated and cut.bearing_contact is BearingContact.NONE:
+        if not session.known or (seated and cut.bearing_contact is BearingContact.NONE):
             roots[regime] = {'frequency': None, 'growth_rate': None}
             continue
         root = rightmost_root(
-            history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
+            session.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
         )
         roots[regime] = {
             'frequency': root.imag / (2.0 * math.pi),

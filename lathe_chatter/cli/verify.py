@@ -7,11 +7,22 @@ from pathlib import Path
 
 from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen
-from lathe_chatter.recording import RunReadError, Verification, read_run, resimulate, verify
+from lathe_chatter.recording import (
+    Finding,
+    RunReadError,
+    Verification,
+    read_run,
+    resimulate,
+    verify,
+)
 from lathe_chatter.recording.resimulate import finding_of
 
 NAME = 'verify'
-HELP = 'prove a recorded run complete and unaltered, or say what is wrong (exit code 1)'
+HELP = (
+    'prove a recorded run complete and unaltered, or say what is wrong (exit code 1; 3: unproven)'
+)
+_NOT_PROVEN = 3
+"""Exit code where nothing is wrong, and the samples can be neither confirmed nor denied."""
 EXAMPLE = 'lathe-chatter verify runs/20260401-120000 --resimulate'
 
 
@@ -27,7 +38,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Verify; 0 if nothing is missing, else 1."""
+    """Verify; 0 if nothing is wrong, 1 if something is, 3 if only the proof cannot be given."""
     screen = Screen(json=options.json)
     found = _verified(options.run_path, screen, again=options.resimulate)
     for name, count in sorted(found.messages.items()):
@@ -35,8 +46,11 @@ def run(options: Namespace) -> int:
     for name, samples in sorted(found.samples.items()):
         screen.say(f'{name}: {samples.samples} samples, {samples.first:g} s to {samples.last:g} s')
     for finding in found.findings:
-        screen.say(('WRONG  ' if finding.loss else 'note   ') + finding.text)
+        screen.say(_rank(finding) + finding.text)
+    unproven = any(finding.unproven for finding in found.findings)
     screen.say('complete' if found.complete else 'NOT complete')
+    if unproven:
+        screen.say('NOT PROVEN: what cannot be computed again is neither confirmed nor denied')
     screen.json(
         {
             'complete': found.complete,
@@ -45,7 +59,14 @@ def run(options: Namespace) -> int:
             'findings': found.findings,
         }
     )
-    return 0 if found.complete else 1
+    return 1 if not found.complete else _NOT_PROVEN if unproven else 0
+
+
+def _rank(finding: Finding) -> str:
+    """How a finding is to be taken."""
+    if finding.loss:
+        return 'WRONG  '
+    return 'UNSURE ' if finding.unproven else 'note   '
 
 
 def _verified(path: Path, screen: Screen, *, again: bool) -> Verification:

@@ -101,6 +101,15 @@ def _digest(name: str, values: Mapping[str, str]) -> str:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
+def noted_number(text: str, name: str = '') -> int:
+    """A number of a record, by its name where the value is a JSON object; 0 where it is none."""
+    try:
+        found = json.loads(text)
+        return int(found[name] if name else found)
+    except (ValueError, TypeError, KeyError):
+        return 0
+
+
 def parameter_values(answers: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:
     """The values of a record of parameters.
 

@@ -11,8 +11,9 @@ import numpy as np
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.cut_events import Change, Knock
-from lathe_chatter.recording.cut_log import CutLog
+from lathe_chatter.lathe.cut_events import BEGINNING, Change, Knock
+from lathe_chatter.lathe.virtual_lathe import VirtualLathe
+from lathe_chatter.recording.cut_log import CutLog, CutSession
 from lathe_chatter.recording.sample_reader import SampleBlocks
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
@@ -48,49 +49,47 @@ class Replay:
 
     Attributes:
         compared: Samples that were equal.
-        has_beginning: Whether the record says of the present session how it began.
-        logged: Whether the record says anything of what happened to the cut.
-        after_gap: Whether samples are missing between the last that was equal and the next.
+        doubt: Why the next sample need not be what is computed; empty where nothing speaks so.
+        session: The present one.
     """
 
     def __init__(self, log: CutLog) -> None:
-        """Begin as the record says.
+        """Begin with no session."""
+        self.compared = 0
+        self.doubt = ''
+        self.session: CutSession | None = None
+        self._logged = log.logged
+        self._waiting: list[Change | Knock] = []
+        self._lathe = VirtualLathe()
+
+    def begin(self, session: CutSession) -> None:
+        """Begin a session, at time zero.
 
         Raises:
-            ReplayError: If it says too little.
+            ReplayError: If the record says too little of it.
             ParameterError: If it says what no lathe can be.
         """
-        if not log.parameters:
-            raise ReplayError('The run does not say with what parameters the lathe was started.')
-        self.compared = 0
-        self.after_gap = False
-        self.logged = log.logged
-        self._sessions = log.sessions
-        self._session = -1
-        self._waiting: list[Change | Knock] = []
-        self._lathe = recorded_config(log.parameters).lathe()
-
-    def _begin(self, published: int) -> None:
-        """Begin the session of a block, at time zero.
-
-        Args:
-            published: When the block was, ns since the epoch: sessions may pass without one.
-        """
-        sessions, self._session = self._sessions, self._session + 1
-        while self._session + 1 < len(sessions) and sessions[self._session + 1].begun <= published:
-            self._session += 1
-        if self._session >= len(sessions):
-            raise ReplayError(
-                'Simulated time goes back, and the record does not say how the lathe began again.'
-            )
-        session = sessions[self._session]
         if not session.parameters:
             raise ReplayError(
-                'The lathe was started a second time, and with what parameters is not recorded.'
+                'The lathe began again, and with what parameters is not in the record.'
+                if self.session is not None
+                else 'The run does not say with what parameters the lathe was started.'
             )
+        self.session = session
         self._lathe = recorded_config(session.parameters).lathe()
-        self.has_beginning = bool(session.beginning)
         self._waiting = list(session.events)
+        if not self._logged:
+            self.doubt = (
+                'The record has nothing of the log of the lathe: whether its cut was changed is '
+                'not known.'
+            )
+        elif not session.beginning:
+            self.doubt = (
+                'The record does not begin with the cut: what was changed before it began is not '
+                'known, so its samples cannot be computed.'
+            )
+        elif session.beginning == BEGINNING:
+            self.doubt = ''  # whatever was missing before was of another process
 
     def compare(self, blocks: SampleBlocks) -> Difference | None:
         """Compare the blocks of some messages with what the lathe does; the first difference.
@@ -105,7 +104,7 @@ class Replay:
             if difference is not None:
                 return difference
             self.compared += len(samples)
-            self.after_gap = False
+            self.doubt = self.doubt if not self._logged else ''
         return None
 
     def _stretches(self, blocks: SampleBlocks) -> Iterator[Array]:
@@ -115,20 +114,21 @@ class Replay:
         places = _places(blocks, self._lathe.sample_rate)
         breaks = np.flatnonzero(places[1:] != places[:-1] + blocks.rows[:-1]) + 1
         for first, last in _spans(len(places), breaks):
-            self._go_to(int(places[first]), int(blocks.publish_times[first]))
+            self._go_to(int(places[first]))
             yield blocks.samples[begins[first] : ends[last]]
 
-    def _go_to(self, place: int, published: int) -> None:
-        """Have the lathe where the next sample is number `place`, counted from 0.
-
-        Args:
-            place: Of the sample.
-            published: When it was, ns since the epoch.
-        """
-        if self._session < 0 or place < self._lathe.samples_taken:
-            self._begin(published)
+    def _go_to(self, place: int) -> None:
+        """Have the lathe where the next sample is number `place`, counted from 0."""
+        if place < self._lathe.samples_taken:
+            raise ReplayError(
+                'Simulated time goes back, and the record does not say how the lathe began again.'
+            )
+        if self._lathe.samples_taken < place and self._lathe.samples_taken:
+            self.doubt = (
+                'Samples are missing before it, and what happened to the cut meanwhile may be '
+                'missing too.'
+            )
         while self._lathe.samples_taken < place:
-            self.after_gap = self.compared > 0
             self._cut(min(place - self._lathe.samples_taken, _MAX_SAMPLES))
             if self._lathe.guard:
                 raise ReplayError(f'The lathe ends before the samples do. {self._lathe.guard}')
@@ -141,7 +141,8 @@ class Replay:
             wrong = np.argwhere(recorded.view(np.uint64) != computed.view(np.uint64))
             if len(wrong):
                 row, column = (int(each) for each in wrong[0])
-                self.after_gap = self.after_gap and not done + row
+                if done + row and self._logged:
+                    self.doubt = ''
                 self.compared += done + row
                 return Difference(
                     float(computed[row, 0]),

@@ -15,10 +15,12 @@ class Finding(NamedTuple):
     Attributes:
         loss: Whether something is missing or damaged; else it is a remark.
         text: One sentence that names topic or file, and the interval.
+        unproven: Whether it says that something could not be judged, either way.
     """
 
     loss: bool
     text: str
+    unproven: bool = False
 
 
 class SampleCount(NamedTuple):

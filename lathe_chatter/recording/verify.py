@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lathe_chatter.errors import LayoutError
+from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, step_sentence
 from lathe_chatter.recording.completeness import (
     check_end,
     check_files,
@@ -148,6 +149,8 @@ def _check_reception(
 ) -> None:
     """What the recorder itself says was lost on the way to it."""
     for note in notes:
+        for step in noted_steps(note.values) if note.name == CLOCK else ():
+            found.remark(f'At {_clock(step.before / 1e9)} {step_sentence(step.seconds)}')
         if note.name != RECEPTION:
             continue
         for topic in note.values:

@@ -1,29 +1,39 @@
-"""What happened in a recorded run, told from the record alone.
+"""What happened in a recorded run, by the record alone: the story of all lathes that were in it.
 
-Topics carry no simulated time except the samples. So what another topic says is dated by when
-it was recorded, against the samples recorded around it; changes of the cut say their simulated
-time themselves (changes.py).
+The samples carry simulated time, and so do the changes of a cut; other topics are dated by the
+blocks of samples about which they came (`run_timeline`). A lathe that was reset or started again
+begins a new session at time zero: on the axis of a history the sessions follow each other, so its
+times are simulated times as long as there is one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.lathe.cut_events import Change, Knock
+from lathe_chatter.lathe.cut_events import BEGINNING, BEGINNING_AGAIN, Change, Knock
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.recording import Run, read_run
-from lathe_chatter.recording.cut_log import read_cut_log
+from lathe_chatter.recording.clock_steps import step_sentence
+from lathe_chatter.recording.recorded_cuts import RecordedCuts, message_of, recorded_cuts
+from lathe_chatter.recording.run_timeline import Placed, blocks_as_written
+from lathe_chatter.recording.sample_reader import TIME, SampleBlocks
 from lathe_chatter.report.run_samples import RunSamples
 
-_FLAG = 'chatter'
+_MONITOR = 'chatter_monitor/'
+_REASONS = {
+    BEGINNING: 'the lathe was started again',
+    BEGINNING_AGAIN: 'the lathe was reset',
+    '': 'simulated time went back, and why is not in the record',
+}
+"""Why a session but the first begins, by the sentence of its beginning."""
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 
 
@@ -53,6 +63,28 @@ class Ramp(NamedTuple):
     high: float
 
 
+class Session(NamedTuple):
+    """A lathe from one time zero to the next.
+
+    Attributes:
+        time: Where its time zero is on the axis of the history, s.
+        why: How it came to begin, where it is not the first.
+        machine: That cut.
+        start: The cut at time zero.
+        tool_leaves_cut: The force law, see `VirtualLathe`.
+        spindle_acceleration: rev/min per s; 0 where the speed steps.
+        known: Whether the record has its parameters; else they are those of the one before.
+    """
+
+    time: float
+    why: str
+    machine: Machine
+    start: Cut
+    tool_leaves_cut: bool
+    spindle_acceleration: float
+    known: bool
+
+
 @dataclass(frozen=True)
 class History:
     """A run as arrays and occurrences.
@@ -68,6 +100,9 @@ class History:
         estimates: Growth rate, frequency and so on by name: simulated times and values (2, m).
         tool_leaves_cut: The force law, see `VirtualLathe`.
         spindle_acceleration: rev/min per s; 0 where the speed steps.
+        later_sessions: After the first, one for each reset and each new start.
+        known: Whether the parameters at the start are in the record.
+        remarks: What else is to be known, sentences: steps of the clock, contradictions.
     """
 
     path: Path
@@ -80,14 +115,31 @@ class History:
     estimates: dict[str, Array] = field(default_factory=dict)
     tool_leaves_cut: bool = True
     spindle_acceleration: float = 0.0
+    later_sessions: tuple[Session, ...] = ()
+    known: bool = True
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def sessions(self) -> tuple[Session, ...]:
+        """All, in order."""
+        first = Session(
+            0.0, '', self.machine, self.start, self.tool_leaves_cut, self.spindle_acceleration,
+            self.known,
+        )  # fmt: skip
+        return (first, *self.later_sessions)
+
+    def session_at(self, time: float) -> Session:
+        """The session in which a time is, s."""
+        return [self.sessions[0], *(s for s in self.later_sessions if s.time <= time)][-1]
 
     def cut_at(self, time: float) -> Cut:
         """The cut in force at a simulated time, s: what is set, and the speed that is reached."""
         values: dict[str, Any] = {}
+        session = self.session_at(time)
         for change in self.changes:
-            if change.time <= time:
+            if session.time <= change.time <= time:
                 values |= change.new
-        return self.start.with_changes(**{**values, 'spindle_speed_rpm': self.speed_at(time)})
+        return session.start.with_changes(**{**values, 'spindle_speed_rpm': self.speed_at(time)})
 
     def speed_at(self, time: float) -> float:
         """The spindle speed that is reached at a simulated time, rev/min; without its swing."""
@@ -104,22 +156,27 @@ class History:
     def ramps(self) -> list[Ramp]:
         """Every change of the spindle speed in order; a step takes no time."""
         found: list[Ramp] = []
-        for change in self.changes:
-            target = change.new.get('spindle_speed_rpm')
-            if target is None:
-                continue
-            speed = self.start.spindle_speed_rpm
-            if found:
-                last = found[-1]
-                speed = last.high
-                if last.start <= change.time < last.end:  # turned round on its way
-                    share = (change.time - last.start) / (last.end - last.start)
-                    speed = last.low + share * (last.high - last.low)
-                    found[-1] = last._replace(end=change.time, high=speed)
-            taken = 0.0
-            if self.spindle_acceleration:
-                taken = abs(target - speed) / self.spindle_acceleration
-            found.append(Ramp(change.time, change.time + taken, speed, float(target)))
+        speed = self.start.spindle_speed_rpm
+        ends = [*(session.time for session in self.later_sessions), math.inf]
+        for session, end in zip(self.sessions, ends, strict=True):
+            if session.time:
+                if found and found[-1].end > session.time:
+                    found[-1] = _cut_short(found[-1], session.time)
+                begin = session.start.spindle_speed_rpm
+                found.append(Ramp(session.time, session.time, speed, begin))
+            speed = session.start.spindle_speed_rpm
+            for change in self.changes:
+                target = change.new.get('spindle_speed_rpm')
+                if target is None or not session.time <= change.time < end:
+                    continue
+                if found and found[-1].start <= change.time < found[-1].end:
+                    found[-1] = _cut_short(found[-1], change.time)  # turned round on its way
+                    speed = found[-1].high
+                taken = 0.0
+                if session.spindle_acceleration:
+                    taken = abs(target - speed) / session.spindle_acceleration
+                found.append(Ramp(change.time, change.time + taken, speed, float(target)))
+                speed = float(target)
         return found
 
     @property
@@ -147,6 +204,12 @@ class History:
         return spans
 
 
+def _cut_short(ramp: Ramp, time: float) -> Ramp:
+    """A ramp that ends before it has reached its speed."""
+    share = (time - ramp.start) / (ramp.end - ramp.start)
+    return ramp._replace(end=time, high=ramp.low + share * (ramp.high - ramp.low))
+
+
 def read_history(path: Path) -> History:
     """Read what happened in a recorded run.
 
@@ -155,62 +218,119 @@ def read_history(path: Path) -> History:
     """
     run = read_run(path)
     topic = run.samples_topic()
-    samples = RunSamples(lambda: run.sample_blocks(topic))
-    if not samples.count:
+    cuts = recorded_cuts(run, topic.removesuffix('/samples'), lambda name: _MONITOR in name)
+    if not cuts.sampled:
         raise run.without_samples(topic)
-    log = read_cut_log(run, topic.removesuffix('/samples'))
-    figures = _monitor_figures(run)
-    estimates = {
-        name: np.array([samples.simulated_time([at for at, _ in found]), [v for _, v in found]])
-        for name, found in figures.items()
-        if name != _FLAG
-    }
+    sessions = _sessions(cuts)
+    dated = _Dated(cuts, sessions)
+    estimates = {name: dated.series(name) for name in _ESTIMATES}
+    events = [
+        replace(event, time=event.time + session.time)
+        for session, recorded in zip(sessions, cuts.sampled, strict=True)
+        for event in recorded.events
+    ]
+    first = sessions[0]
     return History(
         path=Path(path),
-        machine=machine_from(log.parameters),
-        start=cut_from(log.parameters),
-        samples=samples,
-        changes=list(log.changes),
-        knocks=[
-            each for session in log.sessions for each in session.events if isinstance(each, Knock)
-        ],
-        flags=_flags(samples, figures[_FLAG], estimates),
+        machine=first.machine,
+        start=first.start,
+        samples=RunSamples(lambda: _on_one_axis(run, topic, cuts, sessions)),
+        changes=[event for event in events if isinstance(event, Change)],
+        knocks=[event for event in events if isinstance(event, Knock)],
+        flags=dated.flags(estimates),
         estimates=estimates,
-        tool_leaves_cut=bool(log.parameters.get('tool_leaves_cut', True)),
-        spindle_acceleration=float(log.parameters.get('spindle_acceleration', 0.0)),
+        tool_leaves_cut=first.tool_leaves_cut,
+        spindle_acceleration=first.spindle_acceleration,
+        later_sessions=tuple(sessions[1:]),
+        known=first.known,
+        remarks=_remarks(cuts),
     )
 
 
-def _monitor_figures(run: Run) -> dict[str, list[tuple[int, float]]]:
-    """What the monitor published by name: when it was received, ns, and what; in one pass."""
-    names = (*_ESTIMATES, _FLAG)
-    topics = {_topic(run, f'chatter_monitor/{name}'): name for name in names}
-    topics.pop('', None)
-    found: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
-    for recorded in run.messages(*topics) if topics else ():
-        found[topics[recorded.topic]].append((recorded.log_time, float(recorded.message.data)))
-    return found
+def _sessions(cuts: RecordedCuts) -> list[Session]:
+    """The sessions of which there are samples, one after the other on one axis."""
+    sessions: list[Session] = []
+    values: dict[str, Any] = {}
+    time = 0.0
+    for recorded in cuts.sampled:
+        values = recorded.parameters or values
+        sessions.append(
+            Session(
+                time, _REASONS[recorded.beginning], machine_from(values), cut_from(values),
+                bool(values.get('tool_leaves_cut', True)),
+                float(values.get('spindle_acceleration', 0.0)), bool(recorded.parameters),
+            )
+        )  # fmt: skip
+        time += float(cuts.timeline.last[recorded.blocks.stop - 1])
+    return sessions
 
 
-def _topic(run: Run, ending: str) -> str:
-    """The topic of the run with this ending, empty where there is none."""
-    return next((name for name in sorted(run.topics) if name.endswith(ending)), '')
+def _on_one_axis(
+    run: Run, topic: str, cuts: RecordedCuts, sessions: list[Session]
+) -> Iterator[SampleBlocks]:
+    """The samples with times that go on from session to session."""
+    if len(sessions) == 1:
+        yield from run.sample_blocks(topic)
+        return
+    starts = [recorded.blocks.start for recorded in cuts.sampled]
+    begins = np.array([session.time for session in sessions])
+    done = 0
+    for blocks in blocks_as_written(run, topic):
+        which = np.searchsorted(starts, np.arange(done, done + len(blocks.rows)), 'right') - 1
+        signals = np.array(blocks.signals)
+        signals[blocks.columns.index(TIME)] += np.repeat(begins[which], blocks.rows)
+        done += len(blocks.rows)
+        yield blocks._replace(signals=signals)
 
 
-def _flags(
-    samples: RunSamples, published: list[tuple[int, float]], estimates: Mapping[str, Array]
-) -> list[Flag]:
-    """Every change of the flag."""
-    flags: list[Flag] = []
-    up = False
-    for received, value in published:
-        if bool(value) == up:
-            continue
-        up = bool(value)
-        (time,) = samples.simulated_time([received]).tolist()
-        at = {name: value_near(estimates[name], time) for name in ('frequency', 'growth_rate')}
-        flags.append(Flag(time, up, **at))
-    return flags
+class _Dated:
+    """What the monitor said, by the times of the sessions."""
+
+    def __init__(self, cuts: RecordedCuts, sessions: list[Session]) -> None:
+        self._cuts = cuts
+        self._times = {id(c): s.time for c, s in zip(cuts.sampled, sessions, strict=True)}
+
+    def series(self, name: str) -> Array:
+        """A figure over time (2, m)."""
+        found = self._of(name)
+        values = [message_of(each).data for each in found]
+        return np.array([[self._time(each) for each in found], values], dtype=float)
+
+    def flags(self, estimates: dict[str, Array]) -> list[Flag]:
+        """Every change of the flag."""
+        flags: list[Flag] = []
+        up = False
+        for each in self._of('chatter'):
+            chatter = bool(message_of(each).data)
+            if chatter == up:
+                continue
+            up, time = chatter, self._time(each)
+            at = {name: value_near(estimates[name], time) for name in ('frequency', 'growth_rate')}
+            flags.append(Flag(time, up, **at))
+        return flags
+
+    def _of(self, name: str) -> list[Placed]:
+        return [each for each in self._cuts.messages if each.raw.topic.endswith(_MONITOR + name)]
+
+    def _time(self, found: Placed) -> float:
+        received, _ = self._cuts.timeline.steady(found)
+        session = self._cuts.session_at(received)
+        time = self._cuts.timeline.simulated_time(received, session.blocks)
+        return self._times[id(session)] + time
+
+
+def _remarks(cuts: RecordedCuts) -> list[str]:
+    """Steps of the clock, what does not fit, and lathes that left no sample."""
+    remarks = [
+        f'At {time:.3f} s {step_sentence(seconds)}' for time, seconds in cuts.timeline.steps
+    ]
+    remarks += cuts.log.contradictions
+    sampled = {id(session) for session in cuts.sampled}
+    lost = [each for each in cuts.log.sessions if each.beginning and id(each) not in sampled]
+    if lost:
+        times = 'Once' if len(lost) == 1 else f'{len(lost)} times'
+        remarks.append(f'{times} the lathe began, and no sample of it is in the record.')
+    return remarks
 
 
 def value_near(series: Array, time: float) -> float:

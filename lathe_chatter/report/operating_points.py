@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.plot_style import ALARM
 from lathe_chatter.report.history import History
 from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
@@ -43,8 +43,10 @@ class Stay(NamedTuple):
 
 
 class Bearing(NamedTuple):
-    """What of a cut a chart depends on beside speed and depth."""
+    """What a chart depends on beside speed and depth."""
 
+    machine: Machine
+    tool_leaves_cut: bool
     contact: BearingContact
     clearance: float
     feed_speed: float
@@ -53,7 +55,9 @@ class Bearing(NamedTuple):
 def stays_of(history: History) -> list[Stay]:
     """The operating points of a run in order; where the spindle ramps, those that it reaches."""
     begin, last = history.begin, history.duration
-    changes = sorted({change.time for change in history.changes if begin < change.time <= last})
+    times = [change.time for change in history.changes]
+    times += [session.time for session in history.later_sessions]
+    changes = sorted({time for time in times if begin < time <= last})
     times, ends = [begin, *changes], [*changes, last]
     raised = [flag.time for flag in history.flags if flag.chatter]
     return [
@@ -67,24 +71,26 @@ def stays_of(history: History) -> list[Stay]:
 
 def bearings_of(history: History) -> list[Bearing]:
     """The bearings that need a chart of their own, in order; the first few."""
-    found = [_bearing(stay.cut) for stay in stays_of(history)]
+    found = [_bearing(history, stay) for stay in stays_of(history)]
     return list(dict.fromkeys(found))[:_MOST_CHARTS]
 
 
-def _bearing(cut: Cut) -> Bearing:
-    return Bearing(cut.bearing_contact, cut.bearing_clearance, cut.feed_speed)
+def _bearing(history: History, stay: Stay) -> Bearing:
+    session, cut = history.session_at(stay.start), stay.cut
+    bearing = cut.bearing_contact, cut.bearing_clearance, cut.feed_speed
+    return Bearing(session.machine, session.tool_leaves_cut, *bearing)
 
 
 def draw_path(axes: Axes, history: History, bearing: Bearing) -> None:
     """The chart of a bearing, with every operating point that the run had with it."""
     stays = stays_of(history)
-    here = [stay for stay in stays if _bearing(stay.cut) == bearing]
+    here = [stay for stay in stays if _bearing(history, stay) == bearing]
     speeds = [stay.cut.spindle_speed_rpm for stay in stays]
     low = max(min(speeds) / _AROUND, _LOW)
     high = min(max(speeds) * _AROUND, _HIGH)
     limits = safe_limit(
-        history.machine, here[0].cut, chart_speeds(low, high),
-        tool_leaves_cut=history.tool_leaves_cut,
+        bearing.machine, here[0].cut, chart_speeds(low, high),
+        tool_leaves_cut=bearing.tool_leaves_cut,
     )  # fmt: skip
     lowest = float(limits.open_limit.min())
     deepest = max(stay.cut.depth_of_cut for stay in stays)

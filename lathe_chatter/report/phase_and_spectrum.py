@@ -79,9 +79,10 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     if not top:
         _say_at_rest(axes, 'no amplitude above 1 nm')
         top = _TOP_AT_REST
-    contact = contact_at(history.machine, excerpt.cut, tool_leaves_cut=history.tool_leaves_cut)
+    session = history.session_at(excerpt.until)
+    contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
     root = rightmost_root(
-        history.machine,
+        session.machine,
         excerpt.cut.spindle_speed_rpm,
         excerpt.cut.depth_of_cut,
         seated=contact.seated,

@@ -131,6 +131,7 @@ def _disturbances(history: History) -> list[float]:
     """When the cut was changed or knocked, or its spindle reached its speed, s."""
     times = [change.time for change in history.changes] + [k.time for k in history.knocks]
     times += [ramp.end for ramp in history.ramps]
+    times += [session.time for session in history.later_sessions]
     return sorted({time for time in times if history.begin < time <= history.duration})
 
 

@@ -95,6 +95,7 @@ def _draw_signal(axes: Axes, history: History, name: str, unit: str, colour: str
 def _edges(history: History) -> list[float]:
     """Simulated times from one of which to the next the cut is one, or the spindle ramps, s."""
     times = [change.time for change in history.changes] + [r.end for r in history.ramps]
+    times += [session.time for session in history.later_sessions]
     inside = {time for time in times if history.begin < time < history.duration}
     return sorted({history.begin, history.duration} | inside)
 
@@ -136,9 +137,10 @@ def _legend_above(axes: Axes) -> None:
 def _rate_at(history: History, time: float) -> float:
     """Growth rate of the rightmost root of the cut in force at a simulated time, 1/s."""
     cut = history.cut_at(time)
-    contact = contact_at(history.machine, cut, tool_leaves_cut=history.tool_leaves_cut)
+    session = history.session_at(time)
+    contact = contact_at(session.machine, cut, tool_leaves_cut=session.tool_leaves_cut)
     return rightmost_root(
-        history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
+        session.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
     ).real
 
 
@@ -154,6 +156,8 @@ def _mark(axes: Axes, history: History) -> None:
         axes.axvline(knock.time, color=KNOCK, lw=0.9, ls='-.')
     for change in history.changes:
         axes.axvline(change.time, color='k', lw=0.9, ls=':')
+    for session in history.later_sessions:
+        axes.axvline(session.time, color='k', lw=1.4)
     for start, end in history.chatter_spans():
         axes.axvspan(start, end, color=ALARM, alpha=0.22, lw=0)
     for gap in history.samples.gaps[:_GAPS]:
@@ -170,6 +174,7 @@ def _label_changes(axes: Axes, history: History) -> None:
     labels += [
         (knock.time, f'knock {knock.impulse * 1e3:g} mN s', 'k') for knock in history.knocks
     ]
+    labels += [(session.time, session.why, 'k') for session in history.later_sessions]
     spans = history.chatter_spans()
     labels += [(start, 'chatter flagged', ALARM_TEXT) for start, _ in spans[:1]]
     labels += [(before, 'samples missing', 'k') for before, _ in history.samples.gaps[:1]]

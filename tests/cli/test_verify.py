@@ -10,6 +10,7 @@ from support.recorded import number, topic
 
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.cut_events import BEGINNING
 from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter, read_run
 
@@ -52,9 +53,11 @@ def test_a_damaged_run_is_not_and_its_sound_part_is_saved(
 def test_a_run_that_was_altered_is_found_out_by_computing_it_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name, change in (('true', 0.0), ('altered', 1e-9)):
+    for name, change in (('true', 0.0), ('altered', 1e-9), ('without its log', 1e-9)):
         lathe = VirtualLathe()
         with LatheRun(tmp_path / name, parameters_of(lathe)) as run:
+            if 'log' not in name:
+                run.log(BEGINNING)
             for k in range(20):
                 samples = lathe.advance(20)
                 samples[4, 6] += change * (k == 9)
@@ -64,7 +67,15 @@ def test_a_run_that_was_altered_is_found_out_by_computing_it_again(
     assert main(['verify', str(tmp_path / 'altered')]) == 0
     capsys.readouterr()
     assert main(['verify', str(tmp_path / 'altered'), '--resimulate']) == 1
-    assert 'the sample at 0.0185 s has chip_thickness' in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert 'WRONG  /lathe/samples: the sample at 0.0185 s has chip_thickness' in said
+    assert 'The run was altered.' in said
+    # What cannot be told apart from a change that nobody logged is no accusation.
+    assert main(['verify', str(tmp_path / 'without its log'), '--resimulate']) == 3
+    said = capsys.readouterr().out
+    assert 'UNSURE /lathe/samples: the sample at 0.0185 s has chip_thickness' in said
+    assert 'altered' not in said
+    assert said.endswith('neither confirmed nor denied\n')
 
 
 def test_without_samples_there_is_nothing_to_compute_again(

@@ -183,7 +183,7 @@ def test_a_lathe_that_was_started_again_is_computed_with_its_own_parameters(
         assert found == Resimulation('/lathe/samples', compared=700)
     else:
         assert found.compared == 400
-        assert 'with what parameters is not recorded' in found.obstacle
+        assert 'with what parameters is not in the record' in found.obstacle
 
 
 def test_a_run_of_other_software_is_not_called_altered(tmp_path: Path) -> None:

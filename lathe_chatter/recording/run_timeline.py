@@ -1,0 +1,234 @@
+"""When things happened in a run: by simulated time, and in the order in which they were written.
+
+The stamps of messages are those of the system's clock. It dates a run and orders nothing in it:
+time services set it back and forward while a run is recorded. What has simulated time is ordered
+by that, and other messages by the blocks of samples about which they were written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.recording.chunk_messages import Messages
+from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
+from lathe_chatter.recording.run import Run
+from lathe_chatter.recording.run_file import Raw, RecordedFile
+from lathe_chatter.recording.sample_reader import TIME, SampleBlocks
+
+_STEP_BACK = 10_000_000
+"""ns by which stamps of one topic go back where the clock does, and never else."""
+_SAME_PLACE = 1_000_000_000
+"""ns: simulated time that goes back so near to where the lathe said it does is the same event."""
+
+
+class Placed(NamedTuple):
+    """A message with its place in the run.
+
+    Attributes:
+        raw: The message.
+        place: How many messages were written before it.
+    """
+
+    raw: Raw
+    place: int
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """The blocks of samples of a lathe (n,), in the order in which they were written.
+
+    Attributes:
+        places: How many messages of the run were written before each.
+        received: When each was received by a clock without steps back, ns.
+        published: When each was published, likewise.
+        first: Simulated time of the first sample of each, s.
+        last: Of the last one, s.
+        rows: Samples in each.
+        steps: Of the system's clock: simulated time about then and how far it was set, s.
+        offsets: By how much the stamps of each are ahead of the clock without steps, ns.
+    """
+
+    places: Integers
+    received: Integers
+    published: Integers
+    first: Array
+    last: Array
+    rows: Integers
+    steps: tuple[tuple[float, float], ...]
+    offsets: Integers
+
+    @property
+    def restarts(self) -> Integers:
+        """Blocks whose simulated time is not after that of the block before."""
+        return np.flatnonzero(self.first[1:] <= self.last[:-1]) + 1
+
+    def steady(self, found: Placed) -> tuple[int, int]:
+        """When a message was received and published by the clock without steps back, ns."""
+        raw = found.raw
+        if not len(self.places):
+            return raw.log_time, raw.publish_time
+        near = max(int(np.searchsorted(self.places, found.place)) - 1, 0)
+        offsets = np.unique(self.offsets)
+        far = np.abs(raw.log_time - offsets - self.received[near])
+        offset = int(offsets[np.argmin(far)])
+        received = raw.log_time - offset
+        # What a publisher keeps for late readers may be of before a step.
+        for k in np.flatnonzero(np.diff(self.offsets))[::-1] + 1:
+            step = abs(int(self.offsets[k] - self.offsets[k - 1]))
+            published = raw.publish_time - int(self.offsets[k])
+            # The size of a step is known to some ms, and the other side of it is a step away.
+            if self.received[k - 1] - step // 2 <= published <= received:
+                return received, published
+            offset = int(self.offsets[0])
+        return received, min(raw.publish_time - offset, received)
+
+    def block_at(self, published: int) -> int:
+        """The first block that was published at a time (ns, without steps) or after it.
+
+        Where simulated time goes back close to it, it is the block where it does.
+        """
+        block = int(np.searchsorted(self.published, published))
+        if len(self.restarts) and block not in self.restarts:
+            times = self.published[self.restarts]
+            nearest = int(np.argmin(np.abs(times - published)))
+            if abs(int(times[nearest]) - published) < _SAME_PLACE:
+                return int(self.restarts[nearest])
+        return block
+
+    def simulated_time(self, received: int, blocks: slice) -> float:
+        """Simulated time at which something was received among some blocks, s.
+
+        Args:
+            received: ns, without steps.
+            blocks: Of one session of the lathe; not empty.
+        """
+        times = self.received[blocks]
+        since = (times - times[0]).astype(float)
+        return float(np.interp(float(received - int(times[0])), since, self.last[blocks]))
+
+
+def read_timeline(
+    run: Run, samples: str, others: Callable[[str], bool] = lambda _topic: False
+) -> tuple[Timeline, list[Placed]]:
+    """Read when the blocks of a lathe were written, and other messages with their places.
+
+    Args:
+        run: Which.
+        samples: Topic of the lathe's samples.
+        others: Whether the messages of a topic are wanted too.
+
+    Raises:
+        RunReadError: If a file is damaged.
+        LayoutError: If a message is no block of samples.
+    """
+    found: list[Placed] = []
+    places: list[Integers] = []
+    written = 0
+    for file, contents in run.contents():
+        messages, channels = contents.messages, file.known.channels
+        topics = tuple(channel.topic for channel in channels.values() if others(channel.topic))
+        if topics:
+            here = (written + _places(file, messages, topics)).tolist()
+            found += map(Placed, file.raw_of(messages, topics), here)
+        places.append(written + _places(file, messages, (samples,)))
+        written += len(messages.heads)
+    blocks = [_ends(each) for each in run.sample_blocks(samples, (TIME,))]
+    return _timeline(run, _joined(places), blocks), found
+
+
+def _places(file: RecordedFile, messages: Messages, topics: tuple[str, ...]) -> Integers:
+    """Where in a chunk the messages of some topics are."""
+    numbers = [n for n, channel in file.known.channels.items() if channel.topic in topics]
+    return np.flatnonzero(np.isin(messages.heads['channel'], numbers))
+
+
+class _Ends(NamedTuple):
+    """Blocks (n,) by the times of their first and last samples, s; 0 in those without samples."""
+
+    rows: Integers
+    received: Integers
+    published: Integers
+    times: Array
+
+
+def _ends(blocks: SampleBlocks) -> _Ends:
+    some = blocks.rows > 0
+    last = np.cumsum(blocks.rows)[some] - 1
+    times = np.zeros((len(blocks.rows), 2))
+    times[some, 0] = blocks.times[last - blocks.rows[some] + 1]
+    times[some, 1] = blocks.times[last]
+    return _Ends(blocks.rows, blocks.log_times, blocks.publish_times, times)
+
+
+def _joined(parts: list[Integers]) -> Integers:
+    return np.concatenate(parts) if parts else np.zeros(0, np.int64)
+
+
+def blocks_as_written(run: Run, samples: str) -> Iterator[SampleBlocks]:
+    """The blocks of a lathe in the order of `Timeline`.
+
+    Raises:
+        RunReadError: If a file is damaged.
+        LayoutError: If a message is no block of samples.
+    """
+    for blocks in run.sample_blocks(samples):
+        some = blocks.rows > 0
+        yield blocks._replace(
+            rows=blocks.rows[some],
+            log_times=blocks.log_times[some],
+            publish_times=blocks.publish_times[some],
+        )
+
+
+def _timeline(run: Run, places: Integers, blocks: list[_Ends]) -> Timeline:
+    rows = _joined([each.rows for each in blocks])
+    some = rows > 0
+    received = _joined([each.received for each in blocks])[some]
+    published = _joined([each.published for each in blocks])[some]
+    times = np.concatenate([np.zeros((0, 2)), *(each.times for each in blocks)])[some]
+    # A forward step is no disorder: it looks like a pause, and only the recorder can tell it.
+    passed = np.diff(received)
+    back = np.flatnonzero(passed < -_STEP_BACK)
+    usual = int(np.median(passed)) if len(passed) else 0
+    offsets = np.zeros(len(received), np.int64)
+    for place in back:
+        offsets[place + 1 :] += int(passed[place]) - usual
+    received = received - offsets
+    steps = [(int(place), float(passed[place] - usual) / 1e9) for place in back]
+    notes = [note.values for note in run.notes() if note.name == CLOCK]
+    noted = noted_steps(notes[-1]) if notes else []
+    if noted:  # by who saw it, so also those forward
+        stamps = received + offsets
+        steps = []
+        for step in noted:
+            seen = back if step.seconds < 0.0 else back[:0]
+            steps.append((_block_before(stamps, seen, step.before), step.seconds))
+    return Timeline(
+        places[some],
+        received,
+        np.minimum(published - offsets, received),
+        times[:, 0],
+        times[:, 1],
+        rows[some],
+        tuple((float(times[k, 1]) if len(times) else 0.0, seconds) for k, seconds in steps),
+        offsets,
+    )
+
+
+def _block_before(stamps: Integers, back: Integers, before: int) -> int:
+    """The last block before a step that was seen after the clock had shown `before`.
+
+    Args:
+        stamps: When each block was received, ns since the epoch.
+        back: Blocks after which stamps go back; none for a step forward.
+        before: ns since the epoch.
+    """
+    if len(back):
+        return int(back[np.argmin(np.abs(stamps[back] - before))])
+    later = np.flatnonzero(stamps > before)
+    return max(int(later[0]) - 1, 0) if len(later) else max(len(stamps) - 1, 0)
