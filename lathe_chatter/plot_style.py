@@ -24,6 +24,12 @@ ALARM_TEXT = '#8a3c66'
 KNOCK = '#8A6D00'
 OPEN, SEATED, LINE, SAFE = '#0072B2', '#D55E00', '#000000', '#009E73'
 _PREFIXES = {-4: 'p', -3: 'n', -2: 'µ', -1: 'm', 0: '', 1: 'k', 2: 'M', 3: 'G', 4: 'T'}
+_UNSAID = {
+    '.png': ('Software',),
+    '.svg': ('Date', 'Creator'),
+    '.pdf': ('CreationDate', 'Creator', 'Producer'),
+}
+"""What a file would tell of when and with what it was made."""
 _DPI = 110
 
 
@@ -78,16 +84,24 @@ def axes_or_new(axes: Axes | None) -> Axes:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG and, beside it, as SVG with its text as text."""
+    """Write a figure: as SVG or PDF if the path says so, else as PNG with an SVG beside it."""
     from matplotlib import rc_context
 
     # The layout serves both files: to work it out takes as long as to draw one.
     figure.draw_without_rendering()
     figure.set_layout_engine('none')
     # Neither file tells when or with what it was made: the same picture is the same bytes.
-    with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': path.stem}):
-        figure.savefig(path.with_suffix('.png'), dpi=_DPI, metadata={'Software': None})
-        figure.savefig(path.with_suffix('.svg'), metadata={'Date': None, 'Creator': None})
+    with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': ascii(path.stem)}):
+        for file in files_of_picture(path):
+            unsaid = _UNSAID[file.suffix]
+            figure.savefig(file, dpi=_DPI, metadata=dict.fromkeys(unsaid))
+
+
+def files_of_picture(path: Path) -> list[Path]:
+    """The files that `save` writes."""
+    if path.suffix in {'.svg', '.pdf'}:
+        return [path]
+    return [path.with_suffix('.png'), path.with_suffix('.svg')]
 
 
 def draw_band(

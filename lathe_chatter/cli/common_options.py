@@ -7,7 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lathe_chatter.cli.console import Screen
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.scenario import CLEARED, FLAGGED, Scenario, shipped_scenarios
+
+PICTURES = ('.png', '.svg', '.pdf')
+"""Endings of pictures; beside a PNG there is an SVG."""
 
 
 def add_run(parser: ArgumentParser) -> None:
@@ -23,6 +27,36 @@ def add_json(parser: ArgumentParser) -> None:
         '--json', action='store_true',
         help='print the figures as JSON, and all else on standard error',
     )  # fmt: skip
+
+
+def add_force(parser: ArgumentParser) -> None:
+    """Declare that files which exist may be overwritten."""
+    parser.add_argument('--force', action='store_true', help='overwrite files that exist')
+
+
+def picture_file(path: Path) -> Path:
+    """The file of a picture, as the user names it.
+
+    Raises:
+        ParameterError: If it is none that is written.
+    """
+    if path.suffix not in PICTURES:
+        allowed = f'a file that ends in {", ".join(PICTURES[:-1])} or {PICTURES[-1]}'
+        raise ParameterError('--output', str(path), '', allowed)
+    return path
+
+
+def utf8(option: str, path: Path) -> Path:
+    """A path that the files of a run can name, which are in UTF-8.
+
+    Raises:
+        ParameterError: If its name is in another encoding.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise ParameterError(option, str(path), '', 'a path in UTF-8') from None
+    return path
 
 
 def scenario_help() -> str:

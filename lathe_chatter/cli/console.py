@@ -103,7 +103,8 @@ class Screen:
             table.add_row(*map(Text, row))
         if heading:
             self.say(heading)
-        least = self._console.measure(table).maximum - sum(
+        options = self._console.options.update(width=_ANY)
+        least = self._console.measure(table, options=options).maximum - sum(
             _width([title, *cells], whole=True) - _width([title, *cells], whole=kind != 'text')
             for (title, kind), cells in zip(titles.items(), zip(*rows, strict=True), strict=False)
         )
@@ -217,6 +218,17 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return str(value) if isinstance(value, Path) else value
+
+
+def keep_existing(*paths: Path, force: bool) -> None:
+    """Refuse to overwrite files, unless that is wanted.
+
+    Raises:
+        OutputError: If one exists.
+    """
+    for path in paths:
+        if path.is_file() and not force:
+            raise OutputError(f'{path} exists already: name another, or give --force.')
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, add_run
+from lathe_chatter.cli.common_options import add_json, add_run, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.export import discontinuity_sentences, to_csv, to_parquet, unroll
@@ -54,6 +54,8 @@ def run(options: Namespace) -> int:
     if options.columns is not None:
         columns = tuple(name.strip() for name in options.columns.split(','))
     chosen = Selection(options.topic, columns, options.start, options.end)
+    if form != 'csv':
+        utf8('--output', path)
     recorded = read_run(source)
     screen = Screen(json=options.json)
     total = recorded.count_of_samples(options.topic)

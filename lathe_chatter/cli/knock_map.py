@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.cli.common_options import add_json
-from lathe_chatter.cli.console import INTERRUPTED, Screen, writing
+from lathe_chatter.cli.common_options import add_force, add_json
+from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
 from lathe_chatter.knocks.knock_map import Point
 from lathe_chatter.model import Cut
 from lathe_chatter.model.quantities import quantity_of
+from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.stability import contact_at
 
 NAME = 'knock-map'
@@ -53,6 +54,7 @@ def configure(parser: ArgumentParser) -> None:
         '--tolerance', type=float, default=0.01, metavar='X',
         help='relative width to which the smallest is bracketed (default: %(default)g)',
     )  # fmt: skip
+    add_force(parser)
     add_json(parser)
     add_parameter_options(
         parser,
@@ -75,6 +77,11 @@ def run(options: Namespace) -> int:
         config_of(options), speeds, depths, clearances,
         options.reach, options.step, options.tolerance,
     )  # fmt: skip
+    files = files_of_picture(options.output)
+    if options.output in files:
+        raise ParameterError('--output', str(options.output), '', 'no name of a picture')
+    if not options.output.exists():  # else they are pictures of it
+        keep_existing(*files, force=options.force)
     screen = Screen(json=options.json)
     screen.compile()
     try:
@@ -83,12 +90,12 @@ def run(options: Namespace) -> int:
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {options.output}.')
         return INTERRUPTED
-    picture = options.output.with_suffix('.png')
-    with writing(picture):
-        draw_knock_map(knocks, picture)
+    with writing(options.output):
+        draw_knock_map(knocks, options.output)
     _show(knocks, screen)
     screen.name_file('points', options.output)
-    screen.name_file('picture', picture)
+    for file in files:
+        screen.name_file('picture', file)
     screen.json([_figures(point, limit) for point, limit in sorted(knocks.limits.items())])
     return 0
 

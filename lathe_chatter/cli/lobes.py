@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.cli.common_options import add_json
-from lathe_chatter.cli.console import Screen, writing
+from lathe_chatter.cli.common_options import add_force, add_json, picture_file
+from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.report.stability_chart import chart_speeds, draw_lobes
-from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map, safe_limit
+from lathe_chatter.plot_style import files_of_picture
+from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_lobes
+from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map
 
 NAME = 'lobes'
 HELP = 'draw the stability chart: both limits, the seating line and the safe region'
@@ -28,9 +29,12 @@ EXAMPLE = 'lathe-chatter lobes --bearing-clearance 1e-5 --map --csv lobes.csv'
 _SPEED = Quantity('spindle speed', 'rev/min', low=60.0, high=30000.0)
 _DEPTH = Quantity('top of the chart', 'm', high=0.01, exclusive=True)
 _HEADROOM = 2.6
-_MAP = (111, 38)
+_MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
+_PARTS = 28
+_SHALLOWEST = 1000.0
+"""Part of the top at which a map begins: at a depth of 0 there is no cut."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -49,9 +53,10 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument('--map', action='store_true', help='colour the chart with the growth rate')
     parser.add_argument(
         '--output', type=Path, default=Path('lobes.png'), metavar='FILE',
-        help='picture to write, with an SVG beside it (default: %(default)s)',
+        help='picture to write: .png with an .svg beside it, .svg or .pdf (default: %(default)s)',
     )  # fmt: skip
     parser.add_argument('--csv', type=Path, metavar='FILE', help='write the limits as CSV too')
+    add_force(parser)
     add_json(parser)
     add_parameter_options(
         parser, without=('force_noise', 'sensor_noise', 'runout', 'seed', 'sample_rate',
@@ -65,18 +70,22 @@ def run(options: Namespace) -> int:
     low, high = _SPEED.check('--from', options.low), _SPEED.check('--to', options.high)
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
-    speeds = chart_speeds(low, high)
-    limits = safe_limit(
-        config.machine, config.cut, speeds, tool_leaves_cut=config.setup.tool_leaves_cut
+    files = files_of_picture(picture_file(options.output))
+    keep_existing(*files, *([options.csv] if options.csv else []), force=options.force)
+    if options.csv in files:
+        raise ParameterError('--csv', str(options.csv), '', 'another file than the picture')
+    limits = chart_limits(
+        config.machine,
+        config.cut,
+        chart_speeds(low, high),
+        tool_leaves_cut=config.setup.tool_leaves_cut,
     )
     top = _top(limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
     screen = Screen(json=options.json)
-    varied = config.cut.speed_variation_amplitude > 0.0
     growth = None
-    if options.map or varied:
-        with screen.working('Computing the growth rates ...'):
-            growth = _map(config, low, high, top, varied=varied)
+    if options.map or config.cut.speed_variation_amplitude > 0.0:
+        growth = _map(config, low, high, top, screen)
     with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
         draw_lobes(config.cut, limits, growth, top, options.output)
@@ -84,7 +93,8 @@ def run(options: Namespace) -> int:
         with writing(options.csv):
             _write_csv(options.csv, config, limits)
     _show(config, limits, screen)
-    screen.name_file('picture', options.output)
+    for file in files:
+        screen.name_file('picture', file)
     screen.json(_figures(config, limits, growth))
     return 0
 
@@ -95,14 +105,28 @@ def _top(limits: SafeLimit) -> float:
     return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
 
 
-def _map(config: LatheConfig, low: float, high: float, top: float, *, varied: bool) -> GrowthMap:
-    columns, rows = _VARIED_MAP if varied else _MAP
-    return growth_map(
-        config.machine,
-        config.cut,
-        np.linspace(low, high, columns),
-        np.linspace(top / rows, top, rows),
-        tool_leaves_cut=config.setup.tool_leaves_cut,
+def _map(config: LatheConfig, low: float, high: float, top: float, screen: Screen) -> GrowthMap:
+    """The growth rates over the chart, some speeds at a time."""
+    columns, rows = _VARIED_MAP if config.cut.speed_variation_amplitude > 0.0 else _MAP
+    depths = np.linspace(top / _SHALLOWEST, top, rows)
+    parts = []
+    with screen.progress('growth rates', columns * rows) as bar:
+        for speeds in np.array_split(chart_speeds(low, high, columns), _PARTS):
+            parts.append(
+                growth_map(
+                    config.machine,
+                    config.cut,
+                    speeds,
+                    depths,
+                    tool_leaves_cut=config.setup.tool_leaves_cut,
+                )
+            )
+            bar.advance(speeds.size * rows)
+    return GrowthMap(
+        np.concatenate([part.spindle_speed_rpm for part in parts]),
+        depths,
+        np.hstack([part.growth_rate for part in parts]),
+        np.hstack([part.seated for part in parts]),
     )
 
 

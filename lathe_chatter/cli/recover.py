@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, add_run
+from lathe_chatter.cli.common_options import add_json, add_run, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import recover
 
@@ -27,7 +27,7 @@ def run(options: Namespace) -> int:
     """Recover; 0 if nothing had to be left behind, else 1."""
     path: Path = options.run_path
     output = options.output or path.with_name(f'{path.stem}-recovered')
-    with writing(output):
+    with writing(utf8('--output', output)):
         saved = recover(path, output)
     screen = Screen(json=options.json)
     damage = [*map(str, saved.damage), *saved.lost]

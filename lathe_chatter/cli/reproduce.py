@@ -5,19 +5,29 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import signal
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.cli.common_options import add_json
-from lathe_chatter.cli.console import Screen, plain, writing
+from lathe_chatter.cli.common_options import add_force, add_json
+from lathe_chatter.cli.console import (
+    INTERRUPTED,
+    OutputError,
+    Screen,
+    keep_existing,
+    plain,
+    writing,
+)
 from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
 from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
 from lathe_chatter.paper.overview import draw_conditions, draw_findings, draw_growth
-from lathe_chatter.paper.page import OVERVIEWS, write_page
+from lathe_chatter.paper.page import OVERVIEWS, PAGE, write_page
+from lathe_chatter.plot_style import files_of_picture
 
 NAME = 'reproduce'
 HELP = "reproduce the paper's 14 runs: verdicts, exact roots, measured growth rates, figures"
@@ -38,19 +48,29 @@ def configure(parser: ArgumentParser) -> None:
         action='store_true',
         help='leave out the pictures: tables and figures only',
     )
+    add_force(parser)
     add_json(parser)
 
 
 def run(options: Namespace) -> int:
     """Reproduce; 0 if every verdict of the paper agrees, else 1."""
     folder: Path = options.output
+    pictures = [] if options.no_pictures else [*OVERVIEWS, *paper_pictures()]
+    drawn = [file for picture in pictures for file in files_of_picture(folder / picture.name)]
+    keep_existing(folder / PAGE, folder / FIGURES, *drawn, force=options.force)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     screen = Screen(json=options.json)
     screen.compile()
-    pictures = [] if options.no_pictures else [*OVERVIEWS, *paper_pictures()]
+    try:
+        with writing(folder):
+            results, findings = _work(folder, pictures, screen)
+    except KeyboardInterrupt:
+        for file in drawn:
+            file.unlink(missing_ok=True)
+        screen.say('Interrupted: what was drawn is removed again.')
+        return INTERRUPTED
     with writing(folder):
-        results, findings = _work(folder, pictures, screen)
         page = write_page(folder, results, findings, pictures)
         figures = figures_of(results, findings)
         text = json.dumps(plain(figures), indent=2, allow_nan=False)
@@ -66,17 +86,16 @@ def _work(
     folder: Path, pictures: Sequence[Picture], screen: Screen
 ) -> tuple[list[Reproduced], Findings]:
     """Compute here while other processes draw."""
-    # Not forked: threads of a library that has begun to compute do not survive that.
-    pool = ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context('spawn'))
     total = len(PAPER_RUNS) + _FINDING_STEPS + len(pictures)
-    with pool, screen.progress('runs and pictures', total) as bar:
+    with _workers() as pool, screen.progress('runs and pictures', total) as bar:
         drawn: list[Future[None]] = []
 
         def step(_: Any = None) -> None:
             bar.advance()
 
         def draw(work: Callable[..., None], *arguments: Any) -> None:
-            future = pool.submit(work, *arguments)
+            with _interrupts_held_back():
+                future = pool.submit(work, *arguments)
             future.add_done_callback(step)
             drawn.append(future)
 
@@ -95,6 +114,40 @@ def _work(
         for future in as_completed(drawn):
             future.result()
     return results, findings
+
+
+@contextmanager
+def _workers() -> Iterator[ProcessPoolExecutor]:
+    """Processes that draw; when something goes wrong here they begin nothing more.
+
+    Raises:
+        OutputError: If one was killed.
+    """
+    # Not forked: threads of a library that has begun to compute do not survive that.
+    pool = ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context('spawn'))
+    try:
+        with pool:
+            try:
+                yield pool
+            except BaseException:
+                for process in multiprocessing.active_children():
+                    process.terminate()
+                raise
+    except BrokenExecutor:
+        raise OutputError(
+            'A process that draws was killed, perhaps for want of memory: --no-pictures does '
+            'without.'
+        ) from None
+
+
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Start processes that Ctrl-C does not reach: this one ends them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def figures_of(results: list[Reproduced], findings: Findings) -> dict[str, Any]:

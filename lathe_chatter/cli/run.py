@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from argparse import ArgumentParser, Namespace
 from datetime import datetime
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, scenario_help, verdict
+from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verdict
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
@@ -43,16 +44,17 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Play the scenario; 0 if the monitor said what the scenario expects, else 1."""
-    file = find_scenario(options.scenario)
+    file = utf8('--scenario', find_scenario(options.scenario))
     scenario = load_scenario(file)
     output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
-    if output.exists():
+    if utf8('--output', output).exists():
         raise RunFailedError(f'{output} exists already: give another --output.')
     screen = Screen(json=options.json)
     screen.say(f'{scenario.title}  (scenario {scenario.name})', 'bold')
     screen.compile()
     interrupted = _play(scenario, file, output, screen)
     if interrupted and not _has_samples(output):
+        shutil.rmtree(output, ignore_errors=True)  # else it would pass for a run
         screen.say('Interrupted before anything was recorded.')
         return INTERRUPTED
     if interrupted:

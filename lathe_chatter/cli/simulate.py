@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, scenario_help, verdict
+from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verdict
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
@@ -60,6 +60,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Simulate; 0 if the lathe got to the end and the monitor said what is expected, else 1."""
+    utf8('--output', options.output)
     scenario = _scenario(options)
     knocks = [_knock(text, scenario.duration) for text in options.knock]
     screen = Screen(json=options.json)
@@ -96,7 +97,7 @@ def _scenario(options: Namespace) -> Scenario:
     """What to play: a file's or an empty one, with the options over it."""
     scenario = Scenario('cut', 'A cut', _USUAL_DURATION)
     if options.scenario is not None:
-        scenario = load_scenario(find_scenario(options.scenario))
+        scenario = load_scenario(utf8('--scenario', find_scenario(options.scenario)))
     if options.duration is not None:
         duration = _DURATION.check('--duration', options.duration)
         scenario = replace(scenario, duration=duration)

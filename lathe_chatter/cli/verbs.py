@@ -1,4 +1,4 @@
-"""The verbs of the command line, one module each.
+"""The verbs of the command line, one module each, and the parser of them all.
 
 A verb has NAME, HELP, EXAMPLE, configure(parser) and run(options) -> exit code.
 """
@@ -6,8 +6,11 @@ A verb has NAME, HELP, EXAMPLE, configure(parser) and run(options) -> exit code.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import Protocol
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NoReturn, Protocol
 
+from lathe_chatter import __version__
 from lathe_chatter.cli import (
     bench,
     export,
@@ -21,6 +24,8 @@ from lathe_chatter.cli import (
     simulate,
     verify,
 )
+
+_USER_ERROR = 2
 
 
 class Verb(Protocol):
@@ -50,3 +55,38 @@ VERBS: tuple[Verb, ...] = (
     export,
     bench,
 )
+
+
+class Parser(ArgumentParser):
+    """A parser whose complaint is one line, and one that says where the options are told."""
+
+    def error(self, message: str) -> NoReturn:
+        """Complain and end."""
+        self.exit(_USER_ERROR, f'{self.prog}: {message}\nSee {self.prog} --help.\n')
+
+    def unknown(self, words: Sequence[str]) -> NoReturn:
+        """Complain of words that are none of its options, and end."""
+        known = [option for action in self._actions for option in action.option_strings]
+        near = get_close_matches(words[0].partition('=')[0], known, n=1)
+        hint = f', perhaps {near[0]}' if near else ''
+        self.error(f'unrecognized arguments: {" ".join(words)}{hint}')
+
+
+def parser() -> Parser:
+    """The command line with every verb."""
+    result = Parser(
+        prog='lathe-chatter',
+        description='A virtual lathe with bearing clearance: run it, record it, look into it.',
+    )
+    result.add_argument('--version', action='version', version=f'lathe-chatter {__version__}')
+    verbs = result.add_subparsers(dest='verb', metavar='VERB', required=True)
+    for verb in VERBS:
+        entry = verbs.add_parser(
+            verb.NAME,
+            help=verb.HELP,
+            description=verb.HELP,
+            epilog=f'example: {verb.EXAMPLE}',
+        )
+        verb.configure(entry)
+        entry.set_defaults(run=verb.run, usage_of=entry)
+    return result

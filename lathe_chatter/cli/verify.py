@@ -48,7 +48,8 @@ def run(options: Namespace) -> int:
     for finding in found.findings:
         screen.say(_rank(finding) + finding.text)
     unproven = any(finding.unproven for finding in found.findings)
-    screen.say('complete' if found.complete else 'NOT complete')
+    nothing = '' if found.samples else ', and without samples of a lathe'
+    screen.say(f'{"complete" if found.complete else "NOT complete"}{nothing}')
     if unproven:
         screen.say('NOT PROVEN: what cannot be computed again is neither confirmed nor denied')
     screen.json(

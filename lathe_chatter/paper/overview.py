@@ -12,8 +12,7 @@ from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.paper.findings import Findings
 from lathe_chatter.paper.reproduction import SAMPLE_RATE, Reproduced, paper_lathe
 from lathe_chatter.plot_style import OPEN, SAFE, SEATED, grid, new_figure, save
-from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
-from lathe_chatter.stability import safe_limit
+from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,7 +77,7 @@ def draw_conditions(results: list[Reproduced], path: Path) -> None:
     # The paper's force has no mean, so nothing seats the workpiece: there is no seating line.
     cut = Cut(bearing_contact=BearingContact.GAP)
     speeds = chart_speeds(1500.0, 12000.0)
-    limits = safe_limit(Machine(), cut, speeds, tool_leaves_cut=False)
+    limits = chart_limits(Machine(), cut, speeds, tool_leaves_cut=False)
     draw_limits(axes, limits, cut.bearing_contact, 1.6e-3, shade=False)
     for has_bearing, colour, marker in ((False, OPEN, 'o'), (True, SEATED, 's')):
         for result in results:

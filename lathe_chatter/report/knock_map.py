@@ -11,8 +11,7 @@ import numpy as np
 from lathe_chatter.knocks import KnockMap, Margin
 from lathe_chatter.knocks.knock_map import Point
 from lathe_chatter.plot_style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save
-from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
-from lathe_chatter.stability import safe_limit
+from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,7 +64,7 @@ def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
         )  # fmt: skip
         axes.figure.colorbar(colours, ax=axes, label='smallest lasting knock / (mN s)', pad=0.01)
     cut = of.config.cut.with_changes(bearing_clearance=clearance)
-    limits = safe_limit(of.config.machine, cut, chart_speeds(speeds[0], speeds[-1]))
+    limits = chart_limits(of.config.machine, cut, chart_speeds(speeds[0], speeds[-1]))
     draw_limits(axes, limits, cut.bearing_contact, of.depths[-1], shade=False)
     axes.set_ylim(depths[0] - 0.5 * (depths[1] - depths[0]), depths[-1])
     axes.fill_between([], [], color='#D8F0E7', label='no lasting knock found')

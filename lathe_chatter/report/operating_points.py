@@ -11,8 +11,7 @@ import numpy as np
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.plot_style import ALARM
 from lathe_chatter.report.history import History
-from lathe_chatter.report.stability_chart import chart_speeds, draw_limits
-from lathe_chatter.stability import safe_limit
+from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,7 +87,7 @@ def draw_path(axes: Axes, history: History, bearing: Bearing) -> None:
     speeds = [stay.cut.spindle_speed_rpm for stay in stays]
     low = max(min(speeds) / _AROUND, _LOW)
     high = min(max(speeds) * _AROUND, _HIGH)
-    limits = safe_limit(
+    limits = chart_limits(
         bearing.machine, here[0].cut, chart_speeds(low, high),
         tool_leaves_cut=bearing.tool_leaves_cut,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,22 +17,67 @@ from lathe_chatter.stability import GrowthMap, SafeLimit, safe_limit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SPEEDS = 800
+_REFINEMENTS, _BETWEEN, _CLOSE = 3, 6, 1e-5
+"""Times that speeds are added about peaks, how many between two, and how near is near enough."""
 _MILLI = 1e3
 
 
-def chart_speeds(low_rpm: float, high_rpm: float) -> Array:
+def chart_speeds(low_rpm: float, high_rpm: float, count: int = 800) -> Array:
     """Speeds for a chart, denser where the lobes are: even in 1/speed and in speed by halves."""
-    even = np.linspace(low_rpm, high_rpm, _SPEEDS // 2)
-    by_delay = 1.0 / np.linspace(1.0 / high_rpm, 1.0 / low_rpm, _SPEEDS // 2)
+    even = np.linspace(low_rpm, high_rpm, count // 2)
+    by_delay = 1.0 / np.linspace(1.0 / high_rpm, 1.0 / low_rpm, count // 2)
     speeds: Array = np.unique(np.concatenate((even, np.clip(by_delay, low_rpm, high_rpm))))
     return speeds
+
+
+def chart_limits(
+    machine: Machine, cut: Cut, speeds: Array, *, tool_leaves_cut: bool = True
+) -> SafeLimit:
+    """The limits at some speeds, and at more where they have peaks, which else look blunt.
+
+    Args:
+        machine: Tool, workpiece, bearing and material.
+        cut: Clearance, contact and feed speed.
+        speeds: Rising (n,), rev/min.
+        tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
+    """
+    found = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut)
+    for _ in range(_REFINEMENTS):
+        more = _about_peaks(found)
+        if not more.size:
+            break
+        new = safe_limit(machine, cut, more, tool_leaves_cut=tool_leaves_cut)
+        every = {
+            each.name: np.concatenate((getattr(found, each.name), getattr(new, each.name)))
+            for each in fields(SafeLimit)
+        }
+        order = np.argsort(every['spindle_speed_rpm'], kind='stable')
+        found = SafeLimit(**{name: values[order] for name, values in every.items()})
+    return found
+
+
+def _about_peaks(limits: SafeLimit) -> Array:
+    """Speeds between the highest point of each peak and its neighbours, rev/min."""
+    speeds = limits.spindle_speed_rpm
+    new: list[Array] = [np.zeros(0)]
+    for depth in (limits.open_limit, limits.seated_limit, limits.depth_of_cut):
+        inner = depth[1:-1]
+        peaks = np.isfinite(inner) & (inner >= depth[:-2]) & (inner >= depth[2:])
+        peaks &= (inner > depth[:-2]) | (inner > depth[2:])
+        for k in np.flatnonzero(peaks) + 1:
+            new += [
+                np.linspace(speeds[j], speeds[j + 1], _BETWEEN + 2)[1:-1]
+                for j in (k - 1, k)
+                if speeds[j + 1] - speeds[j] > _CLOSE * speeds[j]
+            ]
+    found: Array = np.setdiff1d(np.concatenate(new), speeds)
+    return found
 
 
 def draw_lobes(
     cut: Cut, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
 ) -> None:
-    """Draw a chart into a PNG file with an SVG beside it; see `draw_chart`."""
+    """Draw a chart into a file, see `draw_chart` and `save`."""
     figure = new_figure(11.0, 6.0)
     draw_chart(figure.subplots(), cut, limits, growth, depth_limit)
     save(figure, path)
@@ -58,7 +104,8 @@ def draw_chart(
             cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
             ms=7, label='the cut',
         )  # fmt: skip
-    axes.legend(loc='upper center', ncols=5, fontsize=9, framealpha=0.9)
+    place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.1)}
+    axes.legend(**place, ncols=5, fontsize=9, frameon=False)
     bearing = {
         BearingContact.NONE: 'no bearing clearance',
         BearingContact.GAP: f'clearance {cut.bearing_clearance * 1e6:g} µm, '
@@ -98,7 +145,7 @@ def plot_lobes(
     speeds = chart_speeds(speed / 3.0, speed * 3.0)
     if spindle_speed_rpm is not None:
         speeds = np.asarray(spindle_speed_rpm, float)
-    limits = safe_limit(machine, cut, speeds)
+    limits = chart_limits(machine, cut, speeds)
     edges = [limits.open_limit, limits.seated_limit, limits.depth_of_cut]
     finite = [edge[np.isfinite(edge)] for edge in edges]
     highest = max((float(np.median(edge)) for edge in finite if len(edge)), default=0.0)
@@ -117,7 +164,7 @@ def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:
     colours = axes.pcolormesh(
         growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
         cmap='PuOr_r', norm=TwoSlopeNorm(0.0, min(low, -1.0), max(high, 1.0)),
-        shading='nearest', rasterized=True, alpha=0.85,
+        shading='gouraud', rasterized=True,
     )  # fmt: skip
     axes.figure.colorbar(colours, ax=axes, label='growth rate / s$^{-1}$', pad=0.01)
     if zero:

@@ -7,11 +7,12 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lathe_chatter.cli import main as cli
-from lathe_chatter.model import Cut, Machine
-from lathe_chatter.stability import safe_limit
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.stability import rightmost_root, safe_limit
 
 
 def test_lobes_tells_the_limits_as_csv_and_json(
@@ -27,10 +28,60 @@ def test_lobes_tells_the_limits_as_csv_and_json(
     assert [float(row['safe_depth']) for row in rows] == figures['safe_depth']
     speeds = figures['spindle_speed_rpm']
     expected = safe_limit(Machine(), Cut(bearing_clearance=1e-5), speeds)
-    assert figures['safe_depth'] == expected.depth_of_cut.tolist()
-    assert figures['seating_line'] == expected.seating_line.tolist()
+    assert figures['safe_depth'] == pytest.approx(expected.depth_of_cut, rel=1e-9)
+    assert figures['seating_line'] == pytest.approx(expected.seating_line, rel=1e-9)
     assert picture.read_bytes().startswith(b'\x89PNG')
     assert picture.with_suffix('.svg').is_file()
+
+
+def test_a_picture_is_what_its_name_says_and_is_not_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    beginnings = {'.png': b'\x89PNG', '.svg': b'<?xml', '.pdf': b'%PDF'}
+    for ending, files in (('.svg', {'a.svg'}), ('.pdf', {'a.pdf'}), ('.png', {'a.png', 'a.svg'})):
+        folder = tmp_path / ending
+        call = ['lobes', '--output', str(folder / f'a{ending}')]
+        assert cli.main(call) == 0
+        assert {file.name for file in folder.iterdir()} == files
+        said = capsys.readouterr().out
+        for file in folder.iterdir():
+            assert file.read_bytes().startswith(beginnings[file.suffix])
+            assert f'picture  {file}\n' in said
+        assert cli.main(call) == 2
+        assert f'a{ending} exists already' in capsys.readouterr().err
+        assert cli.main([*call, '--force']) == 0
+
+
+def test_the_peaks_of_the_lobes_are_sharp(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where two lobes meet, against a thousand times as many speeds about the place."""
+    call = ['lobes', '--output', str(tmp_path / 'a.png'), '--bearing-contact', 'none', '--json']
+    assert cli.main([*call, '--from', '1000', '--to', '4000']) == 0
+    figures = json.loads(capsys.readouterr().out)
+    speeds, limit = (np.array(figures[name]) for name in ('spindle_speed_rpm', 'open_limit'))
+    peaks = np.flatnonzero((limit[1:-1] > limit[:-2]) & (limit[1:-1] > limit[2:])) + 1
+    assert len(peaks) >= 5
+    for place in speeds[peaks]:
+        close = np.linspace(0.995 * place, 1.005 * place, 20_001)
+        found = safe_limit(Machine(), Cut(bearing_contact=BearingContact.NONE), close).open_limit
+        assert limit[speeds == place].max() == pytest.approx(found.max(), rel=2e-4)
+
+
+def test_a_map_goes_over_the_whole_chart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(['lobes', '--output', str(tmp_path / 'a.png'), '--map', '--json']) == 0
+    found = json.loads(capsys.readouterr().out)['map']
+    rates = np.array(found['growth_rate'])
+    assert rates.shape == (len(found['depth_of_cut']), len(found['spindle_speed_rpm']))
+    assert found['spindle_speed_rpm'] == sorted(found['spindle_speed_rpm'])
+    k, j = 70, 30
+    root = rightmost_root(
+        Machine(), found['spindle_speed_rpm'][k], found['depth_of_cut'][j],
+        seated=found['seated'][j][k],
+    )  # fmt: skip
+    assert rates[j, k] == pytest.approx(root.real, abs=1e-6)
 
 
 def test_a_machine_without_a_limit_has_a_chart_too(
@@ -52,6 +103,13 @@ def test_a_machine_without_a_limit_has_a_chart_too(
         (['lobes', '--depth-of-cut', 'deep'], "depth_of_cut is 'deep' m"),
         (['lobes', '--tool.mass', '0'], 'tool.mass is 0 kg'),
         (['lobes', '--output', '/dev/null/all.png'], 'cannot be'),
+        (['lobes', '--output', 'chart.xyz'], 'a file that ends in .png, .svg or .pdf'),
+        (['lobes', '--output', '{tmp}/a.png', '--csv', '{tmp}/a.svg'], 'another file than'),
+        (
+            ['lobes', '--output', '{tmp}/a.png', '--csv', '/dev/full'],
+            '/dev/full cannot be written',
+        ),
+        (['knock-map', '--output', '{tmp}/a.png'], 'no name of a picture'),
         (['knock-map', '--speeds', '3000:2000:5'], 'A:B:N with A below B'),
         (['knock-map', '--speeds', 'fast'], '--speeds is'),
         (['knock-map', '--depths', '1'], '--depths is 1.0 m'),
@@ -61,9 +119,9 @@ def test_a_machine_without_a_limit_has_a_chart_too(
     ],
 )
 def test_a_mistake_is_one_sentence(
-    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(arguments) == 2
+    assert cli.main([word.format(tmp=tmp_path) for word in arguments]) == 2
     told = capsys.readouterr().err
     assert words in told
     assert told.count('\n') == 1

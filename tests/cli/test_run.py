@@ -194,6 +194,7 @@ def test_interrupted_before_the_first_sample_it_says_so(
     assert process.returncode == 130, said
     assert 'Interrupted before anything was recorded.' in said
     assert 'Traceback' not in said
+    assert not output.exists()
 
 
 def test_a_refused_step_ends_the_run_with_the_reason(
