@@ -13,11 +13,16 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.cli.common_options import add_force, add_json, picture_file
 from lathe_chatter.cli.console import Screen, keep_existing, writing
-from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
+from lathe_chatter.cli.parameter_options import (
+    add_parameter_options,
+    config_of,
+    given_parameters,
+)
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig
-from lathe_chatter.model import BearingContact
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model.parameters import described_by
+from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_lobes
 from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map
@@ -26,7 +31,9 @@ NAME = 'lobes'
 HELP = 'draw the stability chart: both limits, the seating line and the safe region'
 EXAMPLE = 'lathe-chatter lobes --bearing-clearance 1e-5 --map --csv lobes.csv'
 
-_SPEED = Quantity('spindle speed', 'rev/min', low=60.0, high=30000.0)
+_SPEED = limits_of(Cut, 'spindle_speed_rpm')
+_USUAL = (1000.0, 12000.0)
+"""Range of speeds of a chart where nothing is said of the spindle, rev/min."""
 _DEPTH = Quantity('top of the chart', 'm', high=0.01, exclusive=True)
 _HEADROOM = 2.6
 _MAP = (222, 76)
@@ -40,12 +47,12 @@ _SHALLOWEST = 1000.0
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
-        '--from', dest='low', type=float, default=1000.0, metavar='RPM',
-        help='lowest speed, rev/min (default: %(default)g)',
+        '--from', dest='low', type=float, metavar='RPM',
+        help="lowest speed, rev/min (default: that of the machine file's spindle, else 1000)",
     )  # fmt: skip
     parser.add_argument(
-        '--to', dest='high', type=float, default=12000.0, metavar='RPM',
-        help='highest speed, rev/min (default: %(default)g)',
+        '--to', dest='high', type=float, metavar='RPM',
+        help="highest speed, rev/min (default: that of the machine file's spindle, else 12000)",
     )  # fmt: skip
     parser.add_argument(
         '--depth-limit', type=float, metavar='M', help='top of the chart, m (default: fits)'
@@ -67,7 +74,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Draw and print the chart."""
     config = config_of(options)
-    low, high = _SPEED.check('--from', options.low), _SPEED.check('--to', options.high)
+    low, high = _speed_range(options)
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
     files = files_of_picture(picture_file(options.output))
@@ -97,6 +104,17 @@ def run(options: Namespace) -> int:
         screen.name_file('picture', file)
     screen.json(_figures(config, limits, growth))
     return 0
+
+
+def _speed_range(options: Namespace) -> tuple[float, float]:
+    """What is asked for, else the spindle's range, else a usual one, rev/min."""
+    low, high = _USUAL
+    described = described_by(given_parameters(options))
+    if described is not None and described.fastest_speed < _SPEED.high:
+        low, high = described.slowest_speed, described.fastest_speed
+    low = low if options.low is None else options.low
+    high = high if options.high is None else options.high
+    return _SPEED.check('--from', low), _SPEED.check('--to', high)
 
 
 def _top(limits: SafeLimit) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.model import Machine
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for, widen
 from lathe_chatter.report.history import History
 from lathe_chatter.report.signal_views import Excerpt
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BODIES = (('tool', TOOL, 'o'), ('workpiece', WORKPIECE, 's'))
-_HIGHEST = 600.0
-"""Hz that a spectrum shows."""
+_MODES_UP = 5.0
+"""How far a spectrum goes, in highest natural frequencies of the machine."""
 _HEADROOM = 0.12
 """Of a portrait, above its curves."""
 _DECADES = 4.0
@@ -65,10 +66,12 @@ def draw_section(axes: Axes, history: History, excerpt: Excerpt) -> None:
 
 def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Amplitude spectra of both displacements, with the frequency that the root predicts."""
+    session = history.session_at(excerpt.until)
+    highest = _highest_frequency(session.machine)
     scale, top = Scale(1e6, 'µm'), 0.0
     for name, colour, _ in _BODIES:
         spectrum = excerpt.spectrum(f'{name}_displacement')
-        shown = (spectrum.frequency <= _HIGHEST) & (spectrum.amplitude > 0.0)
+        shown = (spectrum.frequency <= highest) & (spectrum.amplitude > 0.0)
         if not shown.any() or spectrum.amplitude[shown].max() < _FAINTEST:
             continue
         top = max(top, float(spectrum.amplitude[shown].max()))
@@ -79,7 +82,6 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     if not top:
         _say_at_rest(axes, 'no amplitude above 1 nm')
         top = _TOP_AT_REST
-    session = history.session_at(excerpt.until)
     contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
     root = rightmost_root(
         session.machine,
@@ -91,12 +93,18 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     axes.axvline(expected, color='k', lw=0.9, ls='--', label=f'root, {expected:.1f} Hz')
     axes.axvline(excerpt.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')
     axes.set_yscale('log')
-    axes.set_xlim(0.0, _HIGHEST)
+    axes.set_xlim(0.0, highest)
     axes.set_ylim(top * scale.factor * 10.0**-_DECADES, 3.0 * top * scale.factor)
     axes.set_xlabel('frequency / Hz')
     axes.set_ylabel(scale.label('amplitude'))
     axes.legend(loc='upper right', frameon=False, fontsize=8)
     grid(axes)
+
+
+def _highest_frequency(machine: Machine) -> float:
+    """Where a spectrum ends, Hz: some way beyond the highest mode."""
+    modes = (*machine.tool.modes, *machine.workpiece.modes)
+    return _MODES_UP * max(mode.natural_frequency for mode in modes) / (2.0 * math.pi)
 
 
 def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool) -> None:

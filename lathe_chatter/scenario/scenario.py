@@ -12,8 +12,15 @@ from typing import Any
 
 import yaml
 
-from lathe_chatter.errors import ParameterError, ScenarioError, nearest_name, reason_of
-from lathe_chatter.model.parameters import LATHE
+from lathe_chatter.errors import (
+    MachineFileError,
+    ParameterError,
+    ScenarioError,
+    nearest_name,
+    reason_of,
+)
+from lathe_chatter.model.machine_file import load_machine, shipped_machines
+from lathe_chatter.model.parameters import LATHE, MACHINE_FILE
 from lathe_chatter.model.quantities import Quantity
 
 RECOMMENDED = 'recommended'
@@ -149,15 +156,28 @@ def load_scenario(path: Path) -> Scenario:
         name=name,
         title=str(raw.get('title', name)),
         duration=duration,
-        parameters={
-            name: LATHE[name].parsed(value) if name in LATHE else value
-            for name, value in _mapping(raw, 'parameters', where).items()
-        },
+        parameters=_parameters(raw, path, where),
         steps=tuple(_step(entry, f'{where}: step {k + 1}') for k, entry in enumerate(steps)),
         expect=expect,
     )
     _check_times(scenario, where)
     return scenario
+
+
+def _parameters(raw: Mapping[str, Any], path: Path, where: str) -> dict[str, Any]:
+    """Those of the start; a machine file is looked for beside the scenario first."""
+    given = _mapping(raw, 'parameters', where)
+    found = {n: LATHE[n].parsed(v) if n in LATHE else v for n, v in given.items()}
+    machine = found.get(MACHINE_FILE.name)
+    if isinstance(machine, str) and machine:
+        beside = path.parent / machine
+        if machine not in shipped_machines() and '\n' not in machine and beside.is_file():
+            found[MACHINE_FILE.name] = machine = str(beside.resolve())
+        try:
+            load_machine(machine)
+        except MachineFileError as error:
+            raise ScenarioError(f'{where}: {error}') from None
+    return found
 
 
 def _check_times(scenario: Scenario, where: str) -> None:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.config import config_from
+from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, knock_sentence
-from lathe_chatter.model.parameters import LATHE
+from lathe_chatter.model.parameters import LATHE, described_by
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.scenario.player import ScenarioPlayer
@@ -87,7 +87,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
         run.log(BEGINNING)
         simulation = _Simulation(lathe, run, scenario, knocks, tell)
         if monitor:
-            simulation.watch(ChatterDetector(config.machine))
+            simulation.watch(_detector_for(config, scenario))
         while simulation.play_block():
             progress(lathe.time)
     said = simulation.player.said
@@ -99,6 +99,15 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
         said[-1:] == [CLEARED] if monitor else None,
         lathe.guard,
     )
+
+
+def _detector_for(config: LatheConfig, scenario: Scenario) -> ChatterDetector:
+    """One that knows the machine, and recommends what its spindle can."""
+    described = described_by(scenario.parameters)
+    if described is None:
+        return ChatterDetector(config.machine)
+    speeds = described.slowest_speed, described.fastest_speed
+    return ChatterDetector(config.machine, speed_range=speeds)
 
 
 class _Simulation:

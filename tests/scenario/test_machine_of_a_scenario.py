@@ -1,0 +1,73 @@
+"""A scenario with a machine of its own: a tool of 2 kg, a shaft of 20 kg, steel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lathe_chatter.errors import ScenarioError
+from lathe_chatter.model.machine_file import load_machine
+from lathe_chatter.recording import read_run, resimulate
+from lathe_chatter.scenario import load_scenario
+from lathe_chatter.scenario.simulation import simulate
+from lathe_chatter.stability import rightmost_root
+
+MACHINE = """
+tool: {modes: [{frequency: 300 Hz, damping_ratio: 3 %, mass: 2 kg}]}
+workpiece: {modes: [{frequency: 120 Hz, damping_ratio: 3 %, mass: 20 kg}]}
+material: {cutting_coefficient: 1500 MPa}
+spindle: {slowest_speed: 100 rpm, fastest_speed: 3000 rpm}
+cut: {spindle_speed: 1500 rpm, depth_of_cut: 0.2 mm, feed: 0.2 mm/rev}
+"""
+SCENARIO = """
+duration: 4.5
+parameters: {machine: lathe.yaml}
+steps:
+  - at: 1.5
+    set: {depth_of_cut: 0.4 mm}
+  - when: flagged
+    after: 1.0
+    set: {spindle_speed_rpm: recommended}
+expect: {flagged: true, cleared: true}
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    (tmp_path / 'lathe.yaml').write_text(MACHINE)
+    file = tmp_path / 'scenario.yaml'
+    file.write_text(SCENARIO)
+    return file
+
+
+def test_chatter_is_flagged_and_cured_within_the_range_of_the_spindle(
+    scenario: Path, tmp_path: Path
+) -> None:
+    loaded = load_scenario(scenario)
+    told: list[str] = []
+    done = simulate(loaded, tmp_path / 'run', tell=lambda _t, what: told.append(what))
+    assert done.flagged
+    assert done.cleared
+    changes = [what for what in told if what.startswith('spindle_speed_rpm')]
+    speed = float(changes[0].split('=')[1].split()[0])
+    assert 100.0 <= speed <= 3000.0
+    machine = load_machine(tmp_path / 'lathe.yaml').machine
+    before = rightmost_root(machine, 1500.0, 4e-4, seated=False)
+    assert before.real > 0.0
+    assert rightmost_root(machine, speed, 4e-4, seated=False).real < 0.0
+
+
+def test_the_run_holds_the_machine_and_is_proven_without_its_file(
+    scenario: Path, tmp_path: Path
+) -> None:
+    simulate(load_scenario(scenario), tmp_path / 'run', monitor=False)
+    (tmp_path / 'lathe.yaml').unlink()
+    proofs = resimulate(read_run(tmp_path / 'run'))
+    assert [proof.proven for proof in proofs] == [True]
+
+
+def test_a_machine_that_is_none_is_refused_with_its_line(scenario: Path, tmp_path: Path) -> None:
+    (tmp_path / 'lathe.yaml').write_text('tool:\n  modes: 3\n')
+    with pytest.raises(ScenarioError, match=r'lathe\.yaml, line 2'):
+        load_scenario(scenario)
