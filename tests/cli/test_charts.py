@@ -98,7 +98,7 @@ def test_a_machine_without_a_limit_has_a_chart_too(
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['lobes', '--from', '1'], '--from is 1.0 rev/min: it must be'),
+        (['lobes', '--from', '0'], '--from is 0.0 rev/min: it must be'),
         (['lobes', '--from', '4000', '--to', '3000'], 'above --from'),
         (['lobes', '--depth-of-cut', 'deep'], "depth_of_cut is 'deep' m"),
         (['lobes', '--tool.mass', '0'], 'tool.mass is 0 kg'),
