@@ -20,12 +20,13 @@ from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_pe
 from lathe_chatter.nodes import control, simulation_services
 from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
-from lathe_chatter.nodes.diagnostics import Diagnostics, Status
+from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.lathe_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.polled_subscription import publisher_names
 from lathe_chatter.nodes.real_time import (
     SECOND,
     Pacer,
@@ -97,6 +98,7 @@ class LatheNode(ParameterNode):
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
         self._wait_until = 0
+        self._on_topic: list[str] = []
         self._clock_seen, self._clock_stands = (0, 0.0), False
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
@@ -348,6 +350,7 @@ class LatheNode(ParameterNode):
 
     def _report(self) -> None:
         self._watch_clock()
+        self._watch_publishers()
         share = self._meter.requests_share
         if share > FLOOD:
             self._log.warning(
@@ -373,8 +376,26 @@ class LatheNode(ParameterNode):
                 scheduling=self._real_time.word,
             ),
             self._meter.cutting(self._control, self._lathe),
+            self._samples_status(),
             *self._record.statuses(),
         ]
+
+    def _samples_status(self) -> Status:
+        """Whether the samples on the topic are all of this node."""
+        values = {'publishers': ', '.join(self._on_topic), 'readers': self._topics.readers()}
+        if len(self._on_topic) > 1:
+            return Status('samples', WARN, 'not the only lathe on the topic', values)
+        return Status('samples', OK, 'published', values)
+
+    def _watch_publishers(self) -> None:
+        """See who else publishes samples on this topic, and say it once."""
+        before, self._on_topic = self._on_topic, publisher_names(self, '~/samples')
+        if len(self._on_topic) > max(1, len(before)):
+            self._log.warning(
+                f'I am not the only one that publishes {self.resolve_topic_name("~/samples")}: '
+                f'{" and ".join(self._on_topic)} do, and readers cannot tell them apart.',
+                'publishers',
+            )
 
     def _clock_complaint(self) -> str:
         """What is wrong with /clock, where this node drives or follows it."""

@@ -65,6 +65,9 @@ class LatheTopics:
             (publisher(Float64, topic, QoSProfile(depth=deep)), column)
             for topic, column in _SCALARS.items()
         ]
+        # Without a /clock nobody knows simulated time: stamps are the node's then.
+        clocked = publish_clock or node.get_parameter('use_sim_time').value
+        self._now = None if clocked else node.get_clock().now
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
         self._looked_around = -_LOOK_AROUND
@@ -84,7 +87,8 @@ class LatheTopics:
         for publisher, column in self._heard_scalars:
             publisher.publish(encode_number(last[column]))
         if self._heard_joints:
-            self._joints.publish(joint_states(last, stamp))
+            when = stamp if self._now is None else self._now().nanoseconds
+            self._joints.publish(joint_states(last, when))
         self.publish_clock(stamp)
 
     def _look_around(self) -> None:

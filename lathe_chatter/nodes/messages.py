@@ -9,6 +9,7 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _SECOND = 10**9
+BED_FRAME = 'lathe_bed'
 _TOOL, _WORKPIECE = 2, 4
 _FORCE = SAMPLE_COLUMNS.index('cutting_force')
 
@@ -30,14 +31,16 @@ def joint_states(sample: Array, stamp: int) -> JointState:
 
     Args:
         sample: (8,), columns as in `model.SAMPLE_COLUMNS`.
-        stamp: Simulated time, ns.
+        stamp: When, ns.
 
     Returns:
-        Position m, velocity m/s, and effort N: the cutting force, which pushes the tool back
-        and the workpiece on, equations (8a) and (8b).
+        Both along the x axis of the frame `lathe_bed` (config/urdf/lathe.urdf): position m,
+        velocity m/s, and effort N: the cutting force, which pushes the tool back and the
+        workpiece on, equations (8a) and (8b).
     """
     message = JointState(name=['tool', 'workpiece'])
     message.header.stamp = time_message(stamp)
+    message.header.frame_id = BED_FRAME
     force = float(sample[_FORCE])
     message.position = [float(sample[_TOOL]), float(sample[_WORKPIECE])]
     message.velocity = [float(sample[_TOOL + 1]), float(sample[_WORKPIECE + 1])]

@@ -1,13 +1,14 @@
 """A node whose parameters are a table: declared, refused with a sentence, and followed as one.
 
-The three callbacks of rclpy have one role each: pre-set rewrites (a whole number becomes a
-double), on-set validates without side effects, post-set hands over what was accepted.
+A set is rewritten first (a whole number, or a text that is a number, becomes a double), then
+validated without side effects, and handed over once it is accepted.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent, ParameterType, SetParametersResult
@@ -54,7 +55,6 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         for row in table:
             value = self._values[row.name]
             self.declare_parameter(row.name, value, descriptor_of(row), ignore_override=True)
-        self.add_pre_set_parameters_callback(self._with_whole_numbers)
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._accept)
 
@@ -104,20 +104,33 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         asks any callback, in words that lack the name or the unit: refused here, they have a
         sentence of ours.
         """
-        refusal = self._refusal(parameter_list)
+        converted = [self._converted(parameter) for parameter in parameter_list]
+        refusal = self._refusal(converted)
         if refusal:
             return SetParametersResult(successful=False, reason=refusal)
-        return super().set_parameters_atomically(parameter_list)
+        return super().set_parameters_atomically(converted)
+
+    def declare_parameters(
+        self,
+        namespace: str,
+        parameters: Any,
+        ignore_override: Any = False,  # noqa: FBT002 -- rclpy's
+    ) -> Any:
+        """Declare parameters; an empty list among the overrides comes from rcl as no value."""
+        given = [
+            (entry[0], [], *entry[2:]) if len(entry) > 1 and entry[1] is None else entry
+            for entry in parameters
+        ]
+        return super().declare_parameters(namespace, given, ignore_override)
 
     def create_service(
         self, srv_type: Any, srv_name: str, callback: Callable[..., Any], **options: Any
     ) -> Any:
         """Create a service, whose requests are counted in `requests`.
 
-        Those that set parameters survive a type that ROS does not know.
-
-        rclpy raises ValueError on it inside the callback, which would end the node. Without a
-        value it is refused as any other wrong value.
+        Those that set parameters survive a type that ROS does not know: rclpy raises ValueError
+        on it inside the callback, which would end the node. Without a value it is refused as any
+        other wrong value.
         """
         if srv_type in _SET_SERVICES:
             callback = _without_unknown_types(callback)
@@ -146,18 +159,22 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                     raise UnknownParameterError(self._table.unknown(name))
                 # As from a file of parameters for all nodes of a system.
                 self.get_logger().warning(self._table.unknown(name))
-        return {name: parameter.value for name, parameter in overrides.items()}
+        return {
+            name: self._table[name].parsed(parameter.value)
+            for name, parameter in overrides.items()
+            if name in self._table
+        }
 
-    def _with_whole_numbers(self, parameters: list[Parameter]) -> list[Parameter]:
-        return [
-            Parameter(p.name, value=float(p.value))
-            if p.type_ == Parameter.Type.INTEGER and self._is_double(p.name)
-            else p
-            for p in parameters
-        ]
-
-    def _is_double(self, name: str) -> bool:
-        return name in self._table and isinstance(self._table[name].default, float)
+    def _converted(self, parameter: Parameter) -> Parameter:
+        """A number as its row has it, where it was given as a text or as a whole number."""
+        if parameter.name not in self._table:
+            return parameter
+        row = self._table[parameter.name]
+        value = row.parsed(parameter.value)
+        if isinstance(row.default, float) and isinstance(value, int) and value is not True:
+            with suppress(ParameterError):
+                value = row.check(value)
+        return parameter if value is parameter.value else Parameter(row.name, value=value)
 
     def _refusal(self, parameters: list[Parameter]) -> str:
         """Why a set would be refused, as a sentence; empty where it is accepted."""

@@ -15,6 +15,17 @@ from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 
+def publisher_names(node: Node, topic: str) -> list[str]:
+    """The full names of the nodes that publish a topic, one for each publisher, sorted.
+
+    Args:
+        node: That asks the graph.
+        topic: As the node names it; remapped where it is.
+    """
+    offers = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
+    return sorted(f'{offer.node_namespace.rstrip("/")}/{offer.node_name}' for offer in offers)
+
+
 class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type information
     """Keeps subscriptions out of what the executor waits for."""
 

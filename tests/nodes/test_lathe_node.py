@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.qos import ReliabilityPolicy, qos_profile_parameters
+from rclpy.time import Time as Time_
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
@@ -23,6 +26,8 @@ from lathe_chatter.lathe.cut_events import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.control import RunState
 from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.nodes.messages import joint_states
+from lathe_chatter.nodes.tick_statistics import FLOOD
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 TICK = 20
@@ -88,8 +93,7 @@ def test_the_scalars_and_joints_are_the_state_at_the_end_of_the_tick(bench: Benc
     while not (joints and all(scalars.values())):
         bench.steps('/lathe', 1)
     last = dict(zip(SAMPLE_COLUMNS, taken(bench, listen(bench), 7)[-1].tolist(), strict=True))
-    end = Time(nanosec=14_000_000)
-    bench.spin_until(lambda: joints[-1].header.stamp == end, 'the joints')
+    bench.spin_until(lambda: joints[-1].position[0] == last['tool_displacement'], 'the joints')
     for topic, column in SCALARS.items():
         bench.spin_until(
             lambda topic=topic, column=column: scalars[topic][-1].data == last[column], topic
@@ -392,29 +396,75 @@ def test_two_cells_are_told_apart(start: Callable[..., Any], bench: Bench) -> No
     bench.spin_until(
         lambda: (
             {s.name for m in diagnostics for s in m.status}
-            == {f'/cell{k}/lathe: {part}' for k in (1, 2) for part in ('pace', 'cut')}
+            == {f'/cell{k}/lathe: {part}' for k in (1, 2) for part in ('pace', 'cut', 'samples')}
         ),
         'diagnostics of both',
     )
 
 
-def test_under_anothers_clock_it_cuts_that_time_and_no_other(
+def test_joints_are_stamped_with_the_time_that_their_readers_have(
     start: Callable[..., Any], bench: Bench
 ) -> None:
-    clock = bench.node.create_publisher(Clock, '/clock', 10)
-    node = start(LatheNode, use_sim_time=True)
-    joints = bench.listen(JointState, '/lathe/joint_states')
-    bench.spin_until(clock.get_subscription_count, 'a follower')
+    start(LatheNode, namespace='/clocked', publish_clock=True)
+    start(LatheNode, namespace='/alone')
+    clocked = bench.listen(JointState, '/clocked/lathe/joint_states')
+    alone = bench.listen(JointState, '/alone/lathe/joint_states')
+    bench.spin_until(lambda: clocked and alone, 'joints')
+    now = bench.node.get_clock().now().nanoseconds
+    assert clocked[-1].header.stamp.sec < 1000
+    delay = now - Time_.from_msg(alone[-1].header.stamp).nanoseconds
+    assert abs(delay) < 3600e9  # not the 56 years since 1970
+    assert alone[-1].header.frame_id == 'lathe_bed'
 
-    def show(milliseconds: int) -> None:
-        time = Time(sec=milliseconds // 1000, nanosec=milliseconds % 1000 * 10**6)
-        clock.publish(Clock(clock=time))
-        bench.spin_until(lambda: node.get_clock().now().to_msg() == time, 'the clock')
 
-    for milliseconds in (*range(100_000, 100_080, 8), 102_016):  # at last a jump of many ticks
-        show(milliseconds)
-    end = Time(sec=102, nanosec=16 * 10**6)
-    bench.spin_until(lambda: joints and joints[-1].header.stamp == end, 'the last joint state')
-    bench.pause('/lathe')
-    cut = float(bench.trigger('/lathe/step').message.split()[2]) - 0.002
-    assert round((2.016 - cut) * 1000) in range(0, 80, 8)
+def test_the_urdf_has_the_joints_and_the_frame_of_the_joint_states() -> None:
+    robot = ET.parse(Path(__file__).parents[2] / 'config/urdf/lathe.urdf').getroot()
+    message = joint_states(np.arange(8.0), 0)
+    joints = {joint.attrib['name']: joint for joint in robot.iter('joint')}
+    assert sorted(joints) == sorted(message.name)
+    links = {link.attrib['name'] for link in robot.iter('link')}
+    for joint in joints.values():
+        assert joint.attrib['type'] == 'prismatic'
+        assert joint.find('parent').attrib['link'] == message.header.frame_id
+        assert joint.find('child').attrib['link'] in links
+        assert joint.find('axis').attrib['xyz'] == '1 0 0'
+
+
+def test_a_second_lathe_on_the_topic_is_named(start: Callable[..., Any], bench: Bench) -> None:
+    diagnostics = bench.listen_first(DiagnosticArray, '/diagnostics')
+    log: list[Any] = bench.listen_first(Log, '/rosout', LATCHED)
+    start(LatheNode)
+    bench.talk_alone(Float64MultiArray, '/lathe/samples')
+    words = 'not the only lathe on the topic'
+    bench.spin_until(
+        lambda: (s := status(diagnostics, 'samples')) and s.message == words, 'the diagnostic'
+    )
+
+    def said() -> list[str]:
+        return [entry.msg for entry in log if 'not the only one' in entry.msg]
+
+    bench.spin_until(said, 'the sentence')
+    assert said() == [(
+        'I am not the only one that publishes /lathe/samples: '
+        '/bench and /lathe do, and readers cannot tell them apart.'
+    )]  # fmt: skip
+
+
+def test_a_flood_of_requests_is_told(start: Callable[..., Any], bench: Bench) -> None:
+    diagnostics = bench.listen_first(DiagnosticArray, '/diagnostics')
+    start(LatheNode)
+    set_parameters = bench.node.create_client(SetParameters, '/lathe/set_parameters')
+    bench.spin_until(set_parameters.service_is_ready, 'the service')
+    request = SetParameters.Request(parameters=messages_of({'depth_of_cut': 1e-4}) * 100)
+
+    def flooded() -> bool:
+        future = set_parameters.call_async(request)
+        bench.spin_until(future.done, 'an answer')
+        found = status(diagnostics, 'pace')
+        return found is not None and found.message.startswith('flooded')
+
+    bench.spin_until(flooded, 'the warning')
+    found = status(diagnostics, 'pace')
+    assert found.level == DiagnosticStatus.WARN
+    (share,) = (v.value for v in found.values if v.key == 'time taken by requests, fraction')
+    assert float(share) > FLOOD

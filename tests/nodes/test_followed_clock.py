@@ -1,0 +1,105 @@
+"""A lathe under another node's /clock: jumps, steps back and stops are told, and do no harm."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import pytest
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Log
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from support.node_bench import LATCHED, Bench
+
+from lathe_chatter.nodes.lathe_node import LatheNode
+
+
+def moment(milliseconds: int) -> Time:
+    return Time(sec=milliseconds // 1000, nanosec=milliseconds % 1000 * 10**6)
+
+
+class FollowedClock:
+    """A /clock that a test drives, and a lathe that follows it."""
+
+    def __init__(self, start: Callable[..., Any], bench: Bench, **values: Any) -> None:
+        self._clock = bench.node.create_publisher(Clock, '/clock', 10)
+        self.node: LatheNode = start(LatheNode, use_sim_time=True, **values)
+        self.bench = bench
+        self.joints = bench.listen(JointState, '/lathe/joint_states')
+        self.diagnostics = bench.listen(DiagnosticArray, '/diagnostics')
+        self.log = bench.listen(Log, '/rosout', LATCHED)
+        bench.spin_until(self._clock.get_subscription_count, 'a follower')
+
+    def show(self, *milliseconds: int) -> None:
+        for time in map(moment, milliseconds):
+            self._clock.publish(Clock(clock=time))
+            shows = partial(self.shows, time)
+            self.bench.spin_until(shows, 'the clock')
+
+    def shows(self, time: Time) -> bool:
+        return bool(self.node.get_clock().now().to_msg() == time)
+
+    def cut_until(self, milliseconds: int) -> float:
+        """Until the stamps are there: the time that was cut, s."""
+        end = moment(milliseconds)
+        self.bench.spin_until(
+            lambda: self.joints and self.joints[-1].header.stamp == end, 'the last joint state'
+        )
+        self.bench.pause('/lathe')
+        return float(self.bench.trigger('/lathe/step').message.split()[2]) - 0.002
+
+    def said(self, words: str) -> list[str]:
+        """What of the log has some words, once there is any."""
+        found = lambda: [entry.msg for entry in self.log if words in entry.msg]  # noqa: E731
+        self.bench.spin_until(found, words)
+        return found()
+
+    def pace(self, words: str) -> None:
+        """Wait until the diagnostics say something of the pace."""
+        self.bench.spin_until(
+            lambda: words in [s.message for m in self.diagnostics[-2:] for s in m.status], words
+        )
+
+
+def test_under_anothers_clock_it_cuts_that_time_and_no_other(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    clock = FollowedClock(start, bench)
+    clock.show(*range(100_000, 100_080, 8), 102_016)  # at last a jump of many ticks
+    assert round((2.016 - clock.cut_until(102_016)) * 1000) in range(0, 80, 8)
+
+
+def test_a_jump_of_the_clock_is_told_and_not_cut(start: Callable[..., Any], bench: Bench) -> None:
+    clock = FollowedClock(start, bench)
+    clock.show(*range(100_000, 100_080, 8), 3_700_000, *range(3_700_002, 3_700_080, 2))
+    (told,) = clock.said('ahead of the cut')
+    assert re.match(
+        r'/clock is 3599\.\d+ s ahead of the cut at 3700\.\d+ s, more than the 5 s', told
+    )
+    clock.pace('behind: simulated time was given up')
+    assert clock.cut_until(3_700_078) < 0.2
+
+
+def test_how_far_the_clock_is_caught_up_with_can_be_chosen(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    clock = FollowedClock(start, bench, clock_catch_up=20.0)
+    clock.show(*range(100_000, 100_080, 8), 112_000)
+    assert clock.cut_until(112_000) == pytest.approx(12.0, abs=0.08)
+
+
+def test_a_clock_that_goes_back_or_stands_still_is_told(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    clock = FollowedClock(start, bench)
+    clock.show(*range(100_000, 100_080, 2), 50_000, 50_002)
+    assert '/clock went back by' in clock.said('went back')[0]
+    assert clock.said('stands still') == ['/clock stands still at 50.002 s, and the cut with it.']
+    clock.pace('/clock stands still')
+    clock.show(50_004)
+    clock.said('/clock goes on at 50.004 s.')
+    clock.show(50_006)
