@@ -114,27 +114,6 @@ def check_order(found: Verification) -> None:
             found.lose(f'{path.name} {goes_on}, and here {name} follows: names were changed.')
 
 
-def check_metadata(found: Verification) -> None:
-    """That metadata.yaml counts what is there; of a run that was not finished it may be older."""
-    folder = found.run.folder
-    if folder is None or folder.metadata is None or not found.finished:
-        return
-    told: dict[str, int] = {}
-    try:
-        for entry in folder.metadata.get('topics_with_message_count') or ():
-            name = str(entry['topic_metadata']['name'])
-            told[name] = told.get(name, 0) + int(entry['message_count'])
-    except (KeyError, TypeError, ValueError):
-        found.lose(f'{FILE_NAME} does not count the messages of each topic.')
-        return
-    for name in sorted({*told, *found.messages}):
-        if told.get(name, 0) != found.messages[name]:
-            found.lose(
-                f'{FILE_NAME} counts {told.get(name, 0)} messages of {name}, and '
-                f'{found.messages[name]} are there.'
-            )
-
-
 def noted(note: Note, name: str) -> Any:
     """What a note holds as JSON; None where it is damaged, which the CRC of the body tells."""
     try:

@@ -122,6 +122,19 @@ def scan(file: Path, *, chunks: bool = True) -> Iterator[Found]:
         os.close(descriptor)
 
 
+def record_at(file: Path, offset: int) -> Found:
+    """The record at a place where `scan` has found one.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    descriptor = os.open(file, os.O_RDONLY)
+    try:
+        return _Walk(file, descriptor, chunks=True).record_at(offset)
+    finally:
+        os.close(descriptor)
+
+
 def read_chunk(file: Path, read: Read, place: ChunkPlace) -> Chunk | Damage:
     """A chunk that an index names with its message indexes, or what is wrong with it.
 
@@ -200,6 +213,13 @@ class _Walk:
             yield record
             if opcode == Opcode.DATA_END:
                 return
+
+    def record_at(self, position: int) -> Found:
+        """The record at a place."""
+        found = self._head(position)
+        if found is None:
+            return Damage(self._file, position, position, 'what is here cannot be read')
+        return self._record(position, *found)[0]
 
     def _record(self, position: int, opcode: int, length: int) -> tuple[Found, int]:
         """What a record is, and where the next one begins."""

@@ -54,19 +54,18 @@ def recover(path: Path | str, output: Path) -> Recovery:
         OSError: If it cannot be written.
     """
     old = read_run(path, damaged=True)
-    damage: list[Damage] = [*old.damage]
     distribution = str(((old.folder and old.folder.metadata) or {}).get('ros_distro', 'unknown'))
     with atomic_folder(output):
         copy = _Copy(output, distribution)
-        for place, file in enumerate(old.files):
+        for place, file in enumerate(old.opened):
             if place:
                 copy.files.split()
-            copy.add(RecordedFile(file, damage.append))
+            copy.add(file)
         lost = lost_at_the_end(old, copy.messages, copy.last)
-        noted = json.dumps([*map(str, damage), *lost])
+        noted = json.dumps([*map(str, old.damage), *lost])
         copy.files.note(RECOVERED, {'from': str(old.path), 'damage': noted})
         copy.files.close()
-    return Recovery(read_run(output), copy.messages, damage, lost)
+    return Recovery(read_run(output), copy.messages, old.damage, lost)
 
 
 class _Copy:

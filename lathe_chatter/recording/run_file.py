@@ -7,6 +7,7 @@ import struct
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +20,15 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
-from lathe_chatter.recording.mcap_reader import Chunk, ChunkHead, Damage, Found, Plain, scan
+from lathe_chatter.recording.mcap_reader import (
+    Chunk,
+    ChunkHead,
+    Damage,
+    Found,
+    Plain,
+    record_at,
+    scan,
+)
 from lathe_chatter.recording.mcap_summary import Summary, add_record, body_is_sound, read_summary
 from lathe_chatter.recording.provenance import CHECK, OURS, checked
 
@@ -44,7 +53,7 @@ class Contents(NamedTuple):
     """The messages of one chunk, or of some that are in none.
 
     Attributes:
-        offset: Of the chunk, or of the last of these messages, in the file.
+        offset: Of the chunk, or of the first of these messages, in the file.
         messages: All of them, as they were written.
     """
 
@@ -74,6 +83,31 @@ class Raw(NamedTuple):
     data: bytes
     channel: Any
     schema: Any
+
+
+class _Span(NamedTuple):
+    """A chunk, or messages that are in none and follow each other.
+
+    Attributes:
+        first: Earliest log time, ns.
+        offset: Where it begins in the file.
+        last: Latest log time, ns.
+        end: Where the messages end; 0 of a chunk.
+    """
+
+    first: int
+    offset: int
+    last: int
+    end: int = 0
+
+    @classmethod
+    def of(cls, found: Plain, before: _Span | None) -> _Span:
+        """A message, with those before it."""
+        time = _LOG_TIME.unpack_from(found.content.ljust(_LOG_TIME.size, b'\0'))[0]
+        end = found.offset + len(found.content)
+        if before is None:
+            return cls(time, found.offset - _RECORD.size, time, end)
+        return cls(min(before.first, time), before.offset, max(before.last, time), end)
 
 
 class RecordedFile:
@@ -133,33 +167,64 @@ class RecordedFile:
 
         A file may have messages outside of chunks; these come many at a time.
         """
-        loose, last = bytearray(), 0
+        loose = bytearray()
+        first = 0
         for found in scan(self.path):
             if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
-                loose += _RECORD.pack(found.opcode, len(found.content)) + found.content
-                last = found.offset
+                first = first if loose else found.offset
+                loose += _record(found)
                 if len(loose) < _LOOSE_AT_ONCE:
                     continue
             if loose:
-                yield from self._contents_of(Chunk(last, 0, 0, bytes(loose), {}, proven=False))
+                yield from self._contents_of(Chunk(first, 0, 0, bytes(loose), {}, proven=False))
                 loose.clear()
             if isinstance(found, Chunk):
                 yield from self._contents_of(found)
             else:
                 self._learn(found)
         if loose:
-            yield from self._contents_of(Chunk(last, 0, 0, bytes(loose), {}, proven=False))
+            yield from self._contents_of(Chunk(first, 0, 0, bytes(loose), {}, proven=False))
         self._walked = True
+
+    def by_time(self) -> Iterator[tuple[Contents, int]]:
+        """The messages of each chunk, in the order of the earliest of each.
+
+        Each comes with the earliest log time, ns, of what comes after.
+        """
+        self.topics()  # a chunk may name what an earlier one has
+        spans = sorted(self._spans())
+        bounds = [*(span.first for span in spans), _LATEST]
+        for span, bound in zip(spans, bounds[1:], strict=True):
+            found = record_at(self.path, span.offset) if not span.end else self._loose(span)
+            if isinstance(found, Chunk):
+                for contents in self._contents_of(found):
+                    yield contents, bound
+            elif isinstance(found, Damage):
+                self.on_damage(found)
+
+    def _loose(self, span: _Span) -> Chunk:
+        """Messages outside of chunks, as if they were in one."""
+        with self.path.open('rb') as stream:
+            stream.seek(span.offset)
+            records = stream.read(span.end - span.offset)
+        return Chunk(span.offset, span.first, span.last, records, {}, proven=False)
+
+    @property
+    def in_time_order(self) -> bool:
+        """Whether no chunk has a message that was received before one of an earlier chunk."""
+        statistics = self.known.statistics
+        spans = [(place.first, place.last) for place in self.known.chunks if place.last]
+        if statistics is None or statistics.chunk_count != len(self.known.chunks) or not spans:
+            spans = [(span.first, span.last) for span in self._spans() if span.last]
+        return all(before[1] <= after[0] for before, after in pairwise(spans))
 
     def raw_messages(self, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
         """The messages of some topics, or of all if none is named, by the time of reception."""
-        offsets, bounds = self._bounds()
         waiting: list[Raw] = []
-        for contents in self.contents():
+        for contents, bound in self.by_time():
             found = self.raw_of(contents.messages, topics)
             # Sorting keeps the order of those that were received at the same time.
             waiting = sorted([*waiting, *found], key=lambda raw: raw.log_time)
-            bound = bounds[bisect_right(offsets, contents.offset)]
             ready = bisect_right([raw.log_time for raw in waiting], bound)
             yield from waiting[:ready]
             waiting = waiting[ready:]
@@ -186,21 +251,22 @@ class RecordedFile:
                 self.known.schemas.get(channel.schema_id),
             )
 
-    def _bounds(self) -> tuple[list[int], list[int]]:
-        """Offsets, and the earliest log time of what follows each and the beginning, ns."""
-        offsets: list[int] = []
-        firsts: list[int] = []
+    def _spans(self) -> Iterator[_Span]:
+        """Each chunk, and the messages outside of any as far as they follow each other."""
+        loose: _Span | None = None
         for found in scan(self.path, chunks=False):
+            if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
+                loose = _Span.of(found, loose)
+                continue
+            if loose is not None:
+                yield loose
+                loose = None
             if isinstance(found, ChunkHead):
-                empty = not (found.first or found.last)
-                offsets.append(found.offset)
-                firsts.append(_LATEST if empty else found.first)
-            elif isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
-                with contextlib.suppress(struct.error):
-                    firsts.append(_LOG_TIME.unpack_from(found.content)[0])
-                    offsets.append(found.offset)
-        least = np.minimum.accumulate(np.array([*firsts, _LATEST], np.uint64)[::-1])[::-1]
-        return offsets, least.tolist()
+                yield _Span(found.first, found.offset, found.last)
+            elif isinstance(found, Damage):
+                self.on_damage(found)
+        if loose is not None:
+            yield loose
 
     def _learn(self, found: Found) -> None:
         """Take note of what is no message."""
@@ -299,6 +365,11 @@ class RecordedFile:
             reason = f'its messages of channel {min(unknown)} are of a topic that nothing names'
             self.on_damage(Damage(self.path, chunk.offset, chunk.offset, reason))
         yield Contents(chunk.offset, messages)
+
+
+def _record(found: Plain) -> bytes:
+    """A record outside of chunks as it stands in the file."""
+    return _RECORD.pack(found.opcode, len(found.content)) + found.content
 
 
 class _BadCrcError(ValueError):

@@ -61,11 +61,34 @@ class SampleBlocks(NamedTuple):
         times: Array = self.signals[self.columns.index(TIME)]
         return times
 
+    @property
+    def spans(self) -> Array:
+        """Simulated times of the first and last sample of each block, s (2, blocks)."""
+        ends = np.cumsum(self.rows)
+        spans = np.full((2, len(ends)), np.nan)
+        some = self.rows > 0
+        spans[0, some] = self.times[(ends - self.rows)[some]]
+        spans[1, some] = self.times[ends[some] - 1]
+        return spans
 
-def sample_blocks(
-    file: RecordedFile, topic: str, wanted: Sequence[str] | None = None
+    def by_reception(self) -> SampleBlocks:
+        """The same blocks in the order of reception."""
+        order = np.argsort(self.log_times, kind='stable')
+        begins = np.cumsum(self.rows) - self.rows
+        places = [np.arange(begins[k], begins[k] + self.rows[k]) for k in order.tolist()]
+        return SampleBlocks(
+            self.columns,
+            self.signals[:, np.concatenate(places)],
+            self.rows[order],
+            self.log_times[order],
+            self.publish_times[order],
+        )
+
+
+def as_written(
+    file: RecordedFile, topic: str, wanted: Sequence[str] | None
 ) -> Iterator[SampleBlocks]:
-    """The samples of a topic in a file, some 4 s at a time.
+    """The samples of a topic in a file in the order of the file, some 4 s at a time.
 
     Args:
         file: Which.
@@ -88,6 +111,19 @@ def sample_blocks(
             yield from _joined(waiting, wanted)
             waiting.clear()
     yield from _joined(waiting, wanted)
+
+
+def as_received(
+    file: RecordedFile, topic: str, wanted: Sequence[str] | None = None
+) -> Iterator[SampleBlocks]:
+    """The samples of a topic in a file in the order of reception; otherwise as `as_written`."""
+    waiting: list[_Stretch] = []
+    for contents, bound in file.by_time():
+        waiting += _stretches(contents.messages.of(*file.channels_of(topic)))
+        if max((int(each.log_times.max()) for each in waiting), default=0) <= bound:
+            yield from map(SampleBlocks.by_reception, _joined(waiting, wanted))
+            waiting.clear()
+    yield from map(SampleBlocks.by_reception, _joined(waiting, wanted))
 
 
 class _Stretch(NamedTuple):

@@ -6,18 +6,20 @@ import math
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, step_sentence
 from lathe_chatter.recording.completeness import (
     check_end,
     check_files,
-    check_metadata,
     check_order,
     noted,
 )
+from lathe_chatter.recording.metadata_check import check_metadata
 from lathe_chatter.recording.provenance import PUBLISHERS, RECEPTION, STALLS
 from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.run_file import Note, offers_of
@@ -28,6 +30,8 @@ from lathe_chatter.samples.continuity import Continuity, missing_in, time_text
 
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']
 
+_MANY = 5
+"""Places of one kind up to which each has its sentence."""
 
 Progress = Callable[[int], None]
 """Told how many messages have been looked at since it was told last."""
@@ -57,36 +61,75 @@ def verify(path: Path | str, progress: Progress = lambda _count: None) -> Verifi
 
 def _check_messages(found: Verification, progress: Progress) -> dict[str, Numbering]:
     """Read all there is, and follow the numbers that publishers gave."""
-    numberings: dict[str, Numbering] = {}
-    for file, contents in found.run.contents():
-        heads = contents.messages.heads
-        for number in np.unique(heads['channel']).tolist():
-            channel = file.known.channels.get(number)
-            if channel is None:
-                continue  # told as damage
-            of_it = heads[heads['channel'] == number]
-            found.messages[channel.topic] += len(of_it)
-            last = int(of_it['log_time'].max())
-            found.last[channel.topic] = max(last, found.last.get(channel.topic, last))
-            numbered = of_it[of_it['sequence'] > 0]
-            if len(numbered):
-                numbering = numberings.setdefault(channel.topic, Numbering())
-                times = numbered['log_time'].astype(float) / 1e9
-                numbering.take_many(numbered['sequence'].astype(np.int64), times)
-        progress(len(heads))
+    heads: dict[str, list[NDArray[Any]]] = {}
+    for file in found.run.opened:
+        damages, there = len(found.run.damage), 0
+        for contents in file.contents():
+            part = contents.messages.heads
+            there += len(part)
+            for number in np.unique(part['channel']).tolist():
+                channel = file.known.channels.get(number)
+                if channel is not None:  # else told as damage
+                    of_it = part[part['channel'] == number][['sequence', 'log_time']]
+                    heads.setdefault(channel.topic, []).append(of_it)
+            progress(len(part))
+        counted = file.known.statistics
+        undamaged = len(found.run.damage) == damages
+        if counted is not None and undamaged and counted.message_count != there:
+            found.lose(
+                f'The summary of {file.path.name} counts {counted.message_count} messages, and '
+                f'{there} are there.'
+            )
     publishers = _publishers(found.run)
-    for topic, numbering in sorted(numberings.items()):
-        numbering.settle(publishers.get(topic, 1), math.inf)
-        for loss in numbering.losses:
+    numberings: dict[str, Numbering] = {}
+    for topic in sorted(heads):
+        of_it = np.concatenate(heads[topic])
+        found.messages[topic] = len(of_it)
+        found.last[topic] = int(of_it['log_time'].max())
+        numbered = of_it[of_it['sequence'] > 0]
+        if len(numbered):
+            numbering = numberings[topic] = _numbering(numbered)
+            numbering.settle(publishers.get(topic, 1), math.inf)
+            _tell_numbering(found, topic, numbering, publishers.get(topic, 1))
+    return numberings
+
+
+def _numbering(heads: NDArray[Any]) -> Numbering:
+    """The numbers of a topic followed as they were written, or as received if that fits better."""
+    received = heads[np.argsort(heads['log_time'], kind='stable')]
+    if _steps_back(received) < _steps_back(heads):
+        heads = received
+    numbering = Numbering()
+    times = heads['log_time'].astype(float) / 1e9
+    numbering.take_many(heads['sequence'].astype(np.int64), times)
+    return numbering
+
+
+def _steps_back(heads: NDArray[Any]) -> int:
+    return int(np.count_nonzero(heads['sequence'][1:] < heads['sequence'][:-1]))
+
+
+def _tell_numbering(
+    found: Verification, topic: str, numbering: Numbering, publishers: int
+) -> None:
+    """Say what the numbers of a topic say is missing."""
+    losses = numbering.losses
+    if len(losses) > _MANY:
+        found.lose(
+            f'{topic}: {numbering.lost} messages are missing in {len(losses)} places between '
+            f'{_clock(losses[0].since)} and {_clock(losses[-1].until)}, '
+            f'{max(loss.messages for loss in losses)} of them in one.'
+        )
+    else:
+        for loss in losses:
             found.lose(
                 f'{topic}: {loss.messages} messages are missing between {_clock(loss.since)} and '
                 f'{_clock(loss.until)}.'
             )
-        if numbering.before and publishers.get(topic, 1) == 1:
-            found.remark(
-                f'{topic}: the record begins with message {numbering.before + 1} of its publisher.'
-            )
-    return numberings
+    if numbering.before and publishers == 1:
+        found.remark(
+            f'{topic}: the record begins with message {numbering.before + 1} of its publisher.'
+        )
 
 
 def _publishers(run: Run) -> dict[str, int]:
@@ -122,7 +165,7 @@ def _check_samples(found: Verification, progress: Progress) -> None:
                 last = float(times[-1])
                 count += len(times)
         except (LayoutError, ValueError) as error:
-            found.lose(f'{topic}: {error}')
+            found.lose(f'{topic}: {error} What comes after it was not looked at.')
         found.samples[topic] = SampleCount(count, first, last)
         if strange:
             found.lose(f'{topic}: the times of {strange} samples are no numbers.')
@@ -132,16 +175,38 @@ def _check_samples(found: Verification, progress: Progress) -> None:
                 f'{topic}: the record begins at {time_text(first)} of simulated time, '
                 f'{late} samples late.'
             )
-        for gap in continuity.gap_places:
-            found.lose(
-                f'{topic}: {missing_in(gap, continuity.step) or "some"} samples are missing '
-                f'between {time_text(gap[0])} and {time_text(gap[1])} of simulated time.'
-            )
-        for before, after in continuity.restart_places:
-            found.remark(
-                f'{topic}: simulated time goes back from {time_text(before)} to '
-                f'{time_text(after)}: the lathe was reset or started again.'
-            )
+        _tell_breaks(found, topic, continuity)
+
+
+def _tell_breaks(found: Verification, topic: str, continuity: Continuity) -> None:
+    """Say where samples do not follow those before: where there are many places, in short."""
+    gaps, restarts = continuity.gap_places, continuity.restart_places
+    if len(gaps) > _MANY:
+        longest = max(gaps, key=lambda gap: gap[1] - gap[0])
+        found.lose(
+            f'{topic}: {continuity.lost} samples are missing in {len(gaps)} gaps between '
+            f'{time_text(gaps[0][0])} and {time_text(gaps[-1][1])} of simulated time, most of '
+            f'them, {missing_in(longest, continuity.step)}, between {time_text(longest[0])} and '
+            f'{time_text(longest[1])}.'
+        )
+        gaps = []
+    for gap in gaps:
+        found.lose(
+            f'{topic}: {missing_in(gap, continuity.step) or "some"} samples are missing '
+            f'between {time_text(gap[0])} and {time_text(gap[1])} of simulated time.'
+        )
+    if len(restarts) > _MANY:
+        found.remark(
+            f'{topic}: simulated time goes back {len(restarts)} times between '
+            f'{time_text(restarts[0][0])} and {time_text(restarts[-1][1])}: the lathe was reset '
+            'or started again.'
+        )
+        restarts = []
+    for before, after in restarts:
+        found.remark(
+            f'{topic}: simulated time goes back from {time_text(before)} to '
+            f'{time_text(after)}: the lathe was reset or started again.'
+        )
 
 
 def _check_reception(
