@@ -7,9 +7,9 @@ from pathlib import Path
 
 from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen
+from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.recording import (
     Finding,
-    RunReadError,
     Verification,
     read_run,
     resimulate,
@@ -80,7 +80,7 @@ def _verified(path: Path, screen: Screen, *, again: bool) -> Verification:
             bar.show(what='computing again')
             try:
                 found.findings += [finding_of(each) for each in resimulate(found.run)]
-            except RunReadError:
+            except LatheChatterError:
                 if found.complete:  # else there are reasons enough
                     raise
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +14,13 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.recording.metadata import FILE_NAME
 
 _NUMBERED = re.compile(r'^(?P<run>.*)_(?P<number>\d+)$')
+_OTHER_FORMATS = {
+    b'SQLite format 3\0': 'a bag in SQLite',
+    b'#ROSBAG V': 'a bag of ROS 1',
+    b'\x28\xb5\x2f\xfd': 'a file compressed by zstd',
+    b'\x04\x22\x4d\x18': 'a file compressed by lz4',
+}
+"""What files begin with that hold recorded messages in another way."""
 _UNREADABLE = (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError)
 """What reading a metadata.yaml raises that is not there, or is no such thing."""
 
@@ -51,12 +59,11 @@ def run_folder(folder: Path) -> RunFolder:
     metadata, listed = _described(folder)
     mode = str((metadata or {}).get('compression_mode') or 'none').lower()
     if mode != 'none':
-        raise RunReadError(
-            f'{folder} is compressed by {mode}, beyond what MCAP itself does, and is not read: '
-            '`ros2 bag convert` makes a plain one of it.'
-        )
+        raise RunReadError(_refusal(folder, f'a bag compressed by {mode}', folder))
     there = sorted((file for file in folder.glob('*.mcap') if file.is_file()), key=_split)
     if not there:
+        for file in sorted(folder.iterdir()):
+            refuse_other_format(file, folder)
         raise RunReadError(f'{folder} holds no recorded run.')
     runs = {_split(Path(name))[0] for name in listed} or {_split(file)[0] for file in there}
     if not listed and len(runs) > 1:
@@ -69,6 +76,33 @@ def run_folder(folder: Path) -> RunFolder:
         raise RunReadError(f'{folder} holds none of the files that {FILE_NAME} names.')
     strangers = tuple(file.name for file in there if file not in files)
     return RunFolder(tuple(files), _missing(files, listed), strangers, metadata)
+
+
+def refuse_other_format(file: Path, asked: Path | None = None) -> None:
+    """Refuse a bag that is no MCAP by the name of its format.
+
+    Args:
+        file: Which.
+        asked: The folder that was asked for, if it was not the file.
+
+    Raises:
+        RunReadError: If it is such a bag; the text says what makes an MCAP of it.
+    """
+    if not file.is_file():
+        return
+    with file.open('rb') as stream:
+        begin = stream.read(16)
+    for magic, name in _OTHER_FORMATS.items():
+        if begin.startswith(magic):
+            source = file if magic.startswith(b'#ROSBAG') else asked or file.parent
+            raise RunReadError(_refusal(asked or file, name, source))
+
+
+def _refusal(path: Path, what: str, source: Path) -> str:
+    """One sentence: what it is, and what makes of it what can be read."""
+    target = f'{source.resolve().with_suffix("")}-mcap'
+    words = ['rosbags-convert', '--src', str(source), '--dst', target, '--dst-storage', 'mcap']
+    return f'{path} is {what}, and only plain MCAP is read: `{shlex.join(words)}` makes one of it.'
 
 
 def _described(folder: Path) -> tuple[dict[str, Any] | None, list[str]]:

@@ -12,7 +12,12 @@ import numpy as np
 from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.html_table import html_table
-from lathe_chatter.recording.bag_folder import RunFolder, RunReadError, run_folder
+from lathe_chatter.recording.bag_folder import (
+    RunFolder,
+    RunReadError,
+    refuse_other_format,
+    run_folder,
+)
 from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.decoding import Recorded, decoded
 from lathe_chatter.recording.mcap_reader import Damage
@@ -291,6 +296,7 @@ def read_run(path: Path | str, *, damaged: bool = False) -> Run:
     """
     path = Path(path)
     if path.is_file():
+        refuse_other_format(path)
         if path.suffix != '.mcap' and not _begins_as_mcap(path):
             raise RunReadError(f'{path} is no MCAP file.')
         return Run(path, (path,), damaged)

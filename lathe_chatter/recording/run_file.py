@@ -337,7 +337,9 @@ class RecordedFile:
 
     def _plain(self, opcode: int, kind: Any) -> Iterator[Any]:
         for found in scan(self.path, chunks=False):
-            if isinstance(found, Plain) and found.opcode == opcode:
+            if isinstance(found, Damage):
+                self.on_damage(found)
+            elif isinstance(found, Plain) and found.opcode == opcode:
                 try:
                     if opcode == Opcode.ATTACHMENT:
                         _check_attachment(found.content)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -109,14 +113,41 @@ def test_payloads_that_cannot_be_are_losses_and_no_traceback(
     assert main(['recover', str(file), '--output', str(tmp_path / 'saved')]) == 0
 
 
-@pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
-def test_compression_beyond_mcaps_own_is_refused(
-    mode: CompressionMode, blocks: list[Array], tmp_path: Path
+def converted(refused: RunReadError) -> Path:
+    """What the command makes that the sentence names."""
+    command = shlex.split(re.search('`(.+)`', str(refused))[1])  # type: ignore[index]  # there
+    program = Path(sys.executable).with_name(command[0])
+    subprocess.run([program, *command[1:]], check=True, capture_output=True)
+    return Path(command[command.index('--dst') + 1])
+
+
+@pytest.mark.parametrize(
+    ('storage', 'mode', 'what'),
+    [
+        (StoragePlugin.MCAP, CompressionMode.FILE, 'a bag compressed by file'),
+        (StoragePlugin.MCAP, CompressionMode.MESSAGE, 'a bag compressed by message'),
+        (StoragePlugin.SQLITE3, CompressionMode.NONE, 'a bag in SQLite'),
+    ],
+)
+def test_bags_that_are_no_plain_mcap_are_named_with_the_command_that_converts_them(
+    storage: StoragePlugin,
+    mode: CompressionMode,
+    what: str,
+    blocks: list[Array],
+    tmp_path: Path,
 ) -> None:
-    writer = Writer(tmp_path / 'run', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer = Writer(tmp_path / 'a run', version=9, storage_plugin=storage)
     writer.set_compression(mode, CompressionFormat.ZSTD)
     with writer:
         connection = writer.add_connection('/lathe/samples', ARRAY, typestore=STORE)
-        writer.write(connection, START, block(blocks[0]))
-    with pytest.raises(RunReadError, match=r'is compressed by (file|message), .* `ros2 bag conv'):
-        read_run(tmp_path / 'run')
+        for k, samples in enumerate(blocks):
+            writer.write(connection, START + k, block(samples))
+    with pytest.raises(RunReadError, match=rf'a run is {what}, and only plain MCAP') as refused:
+        read_run(tmp_path / 'a run')
+    plain = converted(refused.value)
+    assert array_of(plain).tobytes() == np.concatenate(blocks).tobytes()
+    assert verify(plain).complete
+    if mode is not CompressionMode.MESSAGE:
+        (file,) = (each for each in (tmp_path / 'a run').iterdir() if each.suffix != '.yaml')
+        with pytest.raises(RunReadError, match=r'is a (bag in SQLite|file compressed by zstd)'):
+            read_run(file)
