@@ -20,6 +20,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
+from lathe_chatter.recording.chunk_spans import Span, spans_of
 from lathe_chatter.recording.mcap_reader import (
     Chunk,
     ChunkHead,
@@ -36,8 +37,6 @@ _RECORD = struct.Struct('<BQ')
 _LOOSE_AT_ONCE = 1 << 20
 _LATEST = 2**64 - 1
 """ns: no message is later."""
-_LOG_TIME = struct.Struct('<6xQ')
-"""Within the content of a message."""
 _UNREADABLE = (ValueError, EndOfFile, struct.error)
 """What parsing a record raises whose content is not of its kind."""
 
@@ -83,31 +82,6 @@ class Raw(NamedTuple):
     data: bytes
     channel: Any
     schema: Any
-
-
-class _Span(NamedTuple):
-    """A chunk, or messages that are in none and follow each other.
-
-    Attributes:
-        first: Earliest log time, ns.
-        offset: Where it begins in the file.
-        last: Latest log time, ns.
-        end: Where the messages end; 0 of a chunk.
-    """
-
-    first: int
-    offset: int
-    last: int
-    end: int = 0
-
-    @classmethod
-    def of(cls, found: Plain, before: _Span | None) -> _Span:
-        """A message, with those before it."""
-        time = _LOG_TIME.unpack_from(found.content.ljust(_LOG_TIME.size, b'\0'))[0]
-        end = found.offset + len(found.content)
-        if before is None:
-            return cls(time, found.offset - _RECORD.size, time, end)
-        return cls(min(before.first, time), before.offset, max(before.last, time), end)
 
 
 class RecordedFile:
@@ -192,7 +166,7 @@ class RecordedFile:
         Each comes with the earliest log time, ns, of what comes after.
         """
         self.topics()  # a chunk may name what an earlier one has
-        spans = sorted(self._spans())
+        spans = sorted(spans_of(self.path, self.on_damage))
         bounds = [*(span.first for span in spans), _LATEST]
         for span, bound in zip(spans, bounds[1:], strict=True):
             found = record_at(self.path, span.offset) if not span.end else self._loose(span)
@@ -202,7 +176,7 @@ class RecordedFile:
             elif isinstance(found, Damage):
                 self.on_damage(found)
 
-    def _loose(self, span: _Span) -> Chunk:
+    def _loose(self, span: Span) -> Chunk:
         """Messages outside of chunks, as if they were in one."""
         with self.path.open('rb') as stream:
             stream.seek(span.offset)
@@ -215,7 +189,11 @@ class RecordedFile:
         statistics = self.known.statistics
         spans = [(place.first, place.last) for place in self.known.chunks if place.last]
         if statistics is None or statistics.chunk_count != len(self.known.chunks) or not spans:
-            spans = [(span.first, span.last) for span in self._spans() if span.last]
+            spans = [
+                (span.first, span.last)
+                for span in spans_of(self.path, self.on_damage)
+                if span.last
+            ]
         return all(before[1] <= after[0] for before, after in pairwise(spans))
 
     def raw_messages(self, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
@@ -250,23 +228,6 @@ class RecordedFile:
                 channel,
                 self.known.schemas.get(channel.schema_id),
             )
-
-    def _spans(self) -> Iterator[_Span]:
-        """Each chunk, and the messages outside of any as far as they follow each other."""
-        loose: _Span | None = None
-        for found in scan(self.path, chunks=False):
-            if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
-                loose = _Span.of(found, loose)
-                continue
-            if loose is not None:
-                yield loose
-                loose = None
-            if isinstance(found, ChunkHead):
-                yield _Span(found.first, found.offset, found.last)
-            elif isinstance(found, Damage):
-                self.on_damage(found)
-        if loose is not None:
-            yield loose
 
     def _learn(self, found: Found) -> None:
         """Take note of what is no message."""
