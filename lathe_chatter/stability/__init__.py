@@ -7,13 +7,11 @@ turns roots and lobes into a spindle speed. None needs more than NumPy.
 
 from __future__ import annotations
 
+from lathe_chatter.stability.characteristic import ProcessDamping
+from lathe_chatter.stability.critical_depth import critical_depth, critical_depths
 from lathe_chatter.stability.growth_map import GrowthMap, growth_map
-from lathe_chatter.stability.lobes import (
-    LobeBoundary,
-    critical_depth,
-    critical_depths,
-    lobe_boundary,
-)
+from lathe_chatter.stability.lobes import LobeBoundary, lobe_boundary
+from lathe_chatter.stability.periodic_map import SpeedLaw
 from lathe_chatter.stability.root_count import count_roots_right_of
 from lathe_chatter.stability.roots import leading_roots, rightmost_root, rightmost_roots
 from lathe_chatter.stability.safe_limit import (
@@ -31,7 +29,6 @@ from lathe_chatter.stability.speed_search import (
 )
 from lathe_chatter.stability.speed_variation import (
     Floquet,
-    dominant_eigenvalue,
     floquet,
     varied_growth_rates,
 )
@@ -42,13 +39,14 @@ __all__ = [
     'Floquet',
     'GrowthMap',
     'LobeBoundary',
+    'ProcessDamping',
     'SafeLimit',
     'SpeedAdvice',
+    'SpeedLaw',
     'contact_at',
     'count_roots_right_of',
     'critical_depth',
     'critical_depths',
-    'dominant_eigenvalue',
     'floquet',
     'growth_map',
     'leading_roots',

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.stability.characteristic import checked
+from lathe_chatter.stability.characteristic import ProcessDamping, checked
+from lathe_chatter.stability.periodic_map import SpeedLaw
 from lathe_chatter.stability.roots import rightmost_roots
 from lathe_chatter.stability.safe_limit import safe_limit
 from lathe_chatter.stability.speed_variation import varied_growth_rates
@@ -34,13 +35,15 @@ class GrowthMap:
     seated: NDArray[np.bool_]
 
 
-def growth_map(
+def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     machine: Machine,
     cut: Cut,
     spindle_speed_rpm: ArrayLike,
     depth_of_cut: ArrayLike,
     *,
     tool_leaves_cut: bool = True,
+    law: SpeedLaw = SpeedLaw.SPEED,
+    progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> GrowthMap:
     """The growth rate at every speed and depth, at the clearance and feed speed of a cut.
 
@@ -51,39 +54,37 @@ def growth_map(
         spindle_speed_rpm: Speeds (n,), rev/min.
         depth_of_cut: Depths (m,), m.
         tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
+        law: What swings where the speed is varied.
+        progress: Is told how many points of how many are known, now and then.
 
     Raises:
-        ParameterError: If a speed or depth is not allowed.
+        ParameterError: If a speed or depth is not allowed, or the answer would take minutes.
     """
     speeds = np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
     depths = np.atleast_1d(checked('depth_of_cut', depth_of_cut))
     line = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut).seating_line
     rests: NDArray[np.bool_] = depths[:, None] >= line
     growth = np.empty(rests.shape)
-    for seated in (False, True):
-        here = rests == seated
-        if here.any():
-            growth[here] = _growth(machine, cut, speeds, depths, here, seated=seated)
+    done = 0
+    # A column at a time: so there is something to tell, and a varied speed shares its work.
+    for column, speed in enumerate(speeds.tolist()):
+        for seated in (False, True):
+            here = rests[:, column] == seated
+            if here.any():
+                growth[here, column] = _growth(
+                    machine, cut, speed, depths[here], law, seated=seated
+                )
+        done += depths.size
+        progress(done, growth.size)
     return GrowthMap(speeds, depths, growth, rests)
 
 
-def _growth(  # noqa: PLR0913 -- a map and the part of it that is wanted
-    machine: Machine,
-    cut: Cut,
-    speeds: Array,
-    depths: Array,
-    here: NDArray[np.bool_],
-    *,
-    seated: bool,
-) -> Any:
-    """The growth rates where `here` (m, n) is true, in the order of NumPy's selection."""
+def _growth(  # noqa: PLR0913 -- a column of a map
+    machine: Machine, cut: Cut, speed: float, depths: Array, law: SpeedLaw, *, seated: bool
+) -> Array:
+    """The growth rates at some depths (n,)."""
     if cut.speed_variation_amplitude == 0.0:
-        row, column = np.nonzero(here)
-        return rightmost_roots(machine, speeds[column], depths[row], seated=seated).real
-    # A column at a time shares its work, so whole columns are computed.
-    growth = np.full(here.shape, np.nan)
-    columns, rows = here.any(axis=0), here.any(axis=1)
-    growth[np.ix_(rows, columns)] = varied_growth_rates(
-        machine, cut, speeds[columns], depths[rows], seated=seated
-    )
-    return growth[here]
+        process = ProcessDamping.of(cut)
+        roots = rightmost_roots(machine, speed, depths, seated=seated, process=process)
+        return np.asarray(roots.real)
+    return varied_growth_rates(machine, cut, speed, depths, seated=seated, law=law)[:, 0]

@@ -1,34 +1,36 @@
-"""Stability lobes in closed form: where a root stands on the imaginary axis.
+"""Stability lobes: every frequency of chatter with its depth and, for each lobe, its speed.
 
-At the boundary s = i omega, so with the receptance G = G_t + G_wp of tool and workpiece
+At the boundary s = i omega, and with theta = omega tau the characteristic equation says
 
-    C w = -1 / (2 Re G(i omega)),    omega tau = 2 pi j + 3 pi + 2 arg G(i omega),
+    -1/G(i omega) = C w [1 - cos theta + i (sin theta + rho theta)],   rho = C_pd / (pi D C).
 
-with lobe number j = 0, 1, ... and -pi < arg G < -pi/2: every chatter frequency with Re G < 0
-gives one depth and, for each lobe, one spindle speed.
+Without process damping (rho = 0) this is solved in closed form: C w = -1 / (2 Re G) and
+theta = pi + 2 arg G + 2 pi j with the number j = 0, 1, ... of the lobe. With it a frequency has
+two phases in a lobe, or none: the lobes bend back at low speed.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.model import Machine
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.stability.characteristic import CharacteristicEquation, Complex, checked
+from lathe_chatter.stability.characteristic import (
+    LEAST_DAMPING,
+    NO_DAMPING,
+    Complex,
+    ProcessDamping,
+    receptance,
+    sections_of,
+)
+from lathe_chatter.stability.critical_depth import frequency_grid
+from lathe_chatter.stability.sections import BETA
 
-_PHASE_STEP = 0.2
-"""Largest change of each part of the phase between two points of a frequency grid, rad."""
-_LEAST_DAMPING = 1e-9
-"""What a mode without damping is taken to have where a limit is computed."""
-_REFINEMENTS = 100
-_BATCH = 32
+_HALVINGS = 60
 _LOBES = Quantity('number of lobes', low=1.0, high=1e6)
 _POINTS = Quantity('points of a lobe', low=2.0, high=1e7)
 _DEPTH_LIMIT = Quantity('largest depth of the boundary', 'm', high=1e3, exclusive=True)
@@ -40,7 +42,8 @@ class LobeBoundary:
 
     Attributes:
         spindle_speed_rpm: rev/min (lobes, points).
-        depth_of_cut: Critical depth w, m (lobes, points); one row repeated without a copy.
+        depth_of_cut: Critical depth w, m (lobes, points); without process damping one row
+            repeated without a copy.
         lobe: Lobe number j, 0 at the highest speeds (lobes, points).
         angular_frequency: Of the chatter, rad/s (lobes, points).
     """
@@ -51,10 +54,11 @@ class LobeBoundary:
     angular_frequency: Array
 
 
-def lobe_boundary(
+def lobe_boundary(  # noqa: PLR0913 -- a machine, and how much of its boundary
     machine: Machine,
     *,
     seated: bool,
+    process: ProcessDamping = NO_DAMPING,
     depth_limit: float = 0.005,
     lobes: int = 20,
     points: int = 500,
@@ -64,6 +68,8 @@ def lobe_boundary(
     Args:
         machine: Tool, workpiece, bearing and material.
         seated: Whether the workpiece rests on its bearing.
+        process: Process damping. With it a row goes along the lobe and back; what lies above
+            the depth, or at a frequency that the lobe does not have, is nan.
         depth_limit: Points above this depth are left out, m.
         lobes: How many, from j = 0.
         points: Frequencies, the same for every lobe.
@@ -77,17 +83,22 @@ def lobe_boundary(
     limit = _DEPTH_LIMIT.check('depth_limit', depth_limit)
     count = int(_LOBES.check('lobes', lobes))
     wanted = int(_POINTS.check('points', points))
-    equation = damped_equation(machine, seated=seated)
-    crossings = crossing_frequencies(equation, machine.cutting_stiffness(limit))
-    bands = crossings.reshape(-1, 2) if crossings.size % 2 == 0 else np.zeros((0, 2))
-    share = wanted // max(len(bands), 1)
-    frequency = np.concatenate(
-        [np.zeros(0), *(_dense_where_steep(equation, low, high, share) for low, high in bands)]
-    )
-    receptance = equation.receptance(frequency)
-    depth = -0.5 / (machine.cutting_coefficient * receptance.real) if frequency.size else frequency
+    sections = sections_of(machine, seated=seated, least_damping=LEAST_DAMPING)
+    stiffness = machine.cutting_stiffness(limit)
+    grid = frequency_grid(sections, 0.0)
+    if process.coefficient and stiffness:
+        # At the very ends of a band the depth is 0/0.
+        edges = bands(sections, grid, stiffness, damped=True)
+        frequency = _spread(grid, edges, wanted + len(edges))
+        frequency = frequency[~np.isin(frequency, edges)]
+        return _damped(machine, process, sections, frequency, count, limit)
+    frequency = _spread(grid, bands(sections, grid, stiffness, damped=False), wanted)
+    response = receptance(sections, 1j * frequency)
+    if stiffness:
+        response.real = np.minimum(response.real, -0.5 / stiffness)  # at the very ends rounded
+    depth = -0.5 / (machine.cutting_coefficient * response.real) if frequency.size else frequency
     number = np.arange(count)
-    phase = echo_phase(receptance) + 2.0 * np.pi * number[:, None]
+    phase = echo_phase(response) + 2.0 * np.pi * number[:, None]
     shape = phase.shape
     np.divide(60.0 * frequency, phase, out=phase)
     return LobeBoundary(
@@ -98,164 +109,108 @@ def lobe_boundary(
     )
 
 
-def critical_depth(machine: Machine, spindle_speed_rpm: float, *, seated: bool) -> float:
-    """The depth of cut from which on chatter grows at this spindle speed.
-
-    Args:
-        machine: Tool, workpiece, bearing and material.
-        spindle_speed_rpm: Spindle speed, rev/min.
-        seated: Whether the workpiece rests on its bearing.
-
-    Returns:
-        The smallest w at which a root reaches the imaginary axis, m; infinite for a material
-        that needs no force, next to 0 where any cut excites a mode without damping.
-
-    Raises:
-        ParameterError: If the speed is not allowed.
-    """
-    return float(critical_depths(machine, spindle_speed_rpm, seated=seated))
-
-
-def critical_depths(machine: Machine, spindle_speed_rpm: ArrayLike, *, seated: bool) -> Array:
-    """`critical_depth` at spindle speeds of any shape.
-
-    Every frequency at which the phase condition holds is bracketed on a grid fine enough to
-    follow each pole, each zero and the delay; the one with the smallest depth counts.
-    """
-    speeds = checked('spindle_speed_rpm', spindle_speed_rpm)
-    delay = 60.0 / speeds.ravel()
-    depth = np.full(delay.size, np.inf)
-    if machine.cutting_coefficient > 0.0:
-        equation = damped_equation(machine, seated=seated)
-        order = np.argsort(delay)
-        # Neighbours share a grid: it is as fine as the longest delay among them asks for.
-        for batch in np.split(order, np.arange(_BATCH, delay.size, _BATCH)):
-            stiffness = _critical_stiffness(equation, delay[batch])
-            depth[batch] = stiffness / machine.cutting_coefficient
-    return depth.reshape(speeds.shape)
-
-
-def damped_equation(machine: Machine, *, seated: bool) -> CharacteristicEquation:
-    """The equation for a search along the imaginary axis, on which no pole may lie."""
-    return CharacteristicEquation.of(machine, seated=seated, least_damping=_LEAST_DAMPING)
-
-
-def crossing_frequencies(equation: CharacteristicEquation, cutting_stiffness: float) -> Array:
+def crossing_frequencies(sections: Array, stiffness: float) -> Array:
     """The frequencies, rising, at which 2 C w Re G(i omega) = -1: the boundary at one depth.
 
     Args:
-        equation: Machine and contact regime, with some damping.
-        cutting_stiffness: C w, N/m.
+        sections: Of a machine with some damping.
+        stiffness: C w, N/m.
 
     Returns:
-        Angular frequencies, rad/s (at most 4,).
+        Angular frequencies, rad/s; two for each band of frequencies that the depth excites.
     """
-
-    def excess(omega: Array) -> tuple[Any, Any]:
-        receptance = equation.receptance(omega)
-        slope = 1j * receptance * equation.receptance_log_slope(1j * omega)
-        return (
-            1.0 + 2.0 * cutting_stiffness * receptance.real,
-            2.0 * cutting_stiffness * slope.real,
-        )
-
-    # Far above both modes G is that of a free mass, -1 / (mu omega^2): the last crossing is at
-    # sqrt(2) times the frequency that C w alone would give.
-    free = np.abs(equation.delay_free_roots(np.array([0.0, cutting_stiffness])))
-    top = 4.0 * float(free.max())
-    near = _near_poles_and_zeros(equation, 0.0, top)
-    grid = np.unique(np.concatenate((near, np.geomspace(1e-2 * float(free.min()), top, 100))))
-    negative = excess(grid)[0] < 0.0
-    cell = np.flatnonzero(negative[1:] != negative[:-1])
-    return _solve(excess, grid[cell], grid[cell + 1])
+    # Far above every mode G is that of a free mass, -1 / (mu omega^2).
+    coupled = np.sqrt(2.0 * stiffness * np.abs(sections[:, BETA]).sum())
+    return bands(sections, frequency_grid(sections, 2.0 * coupled), stiffness, damped=False)
 
 
-def echo_phase(receptance: Complex) -> Array:
-    """The phase omega tau, 0 to 2 pi, by which the surface lags: 3 pi + 2 arg G."""
-    lag: Array = 3.0 * np.pi - 2.0 * np.abs(np.angle(receptance))
+def echo_phase(response: Complex) -> Array:
+    """The phase omega tau, 0 to 2 pi, by which the surface lags: pi + 2 arg G."""
+    lag: Array = np.mod(np.pi + 2.0 * np.angle(response), 2.0 * np.pi)
     return lag
 
 
-def _critical_stiffness(equation: CharacteristicEquation, delay: Array) -> Array:
-    """The smallest C w with a root on the imaginary axis, at delays (n,)."""
-    frequency = _frequency_grid(equation, float(delay.max()), float(delay.min()))
-    receptance = equation.receptance(frequency)
-    turns = (np.outer(delay, frequency) - echo_phase(receptance)) / (2.0 * np.pi)
-    lobe = np.floor(turns)
-    row, column = np.nonzero(lobe[:, 1:] != lobe[:, :-1])
-    possible = np.minimum(receptance.real[column], receptance.real[column + 1]) < 0.0
-    row, column = row[possible], column[possible]
-    wanted = np.maximum(lobe[row, column], lobe[row, column + 1])
-    crossing = delay[row]
+def bands(sections: Array, grid: Array, stiffness: float, *, damped: bool) -> Array:
+    """Where bands of frequencies with a depth below the limit begin and end, rising.
 
-    def excess(omega: Array) -> tuple[Any, Any]:
-        phase = omega * crossing - echo_phase(equation.receptance(omega))
-        slope = crossing - 2.0 * equation.receptance_log_slope(1j * omega).real
-        return phase / (2.0 * np.pi) - wanted, slope / (2.0 * np.pi)
-
-    omega = _solve(excess, frequency[column], frequency[column + 1])
-    real = equation.receptance(omega).real
-    stiffness = np.full(delay.size, np.inf)
-    np.minimum.at(stiffness, row[real < 0.0], -0.5 / real[real < 0.0])
-    return stiffness
-
-
-def _solve(function: Callable[[Array], tuple[Any, Any]], low: Array, high: Array) -> Array:
-    """The root between low and high (n,) of a function that gives its values and slopes.
-
-    Newton's method, kept inside brackets that every iteration shortens.
+    Without process damping the depth is -1 / (2 C Re G). With it 1 - cos theta lies anywhere in
+    0..2, so a frequency has a depth where 0 < -Re (1/G) < 2 C w.
     """
-    rising = function(high)[0] >= 0.0
-    omega = 0.5 * (low + high)
-    for _ in range(_REFINEMENTS):
-        value, slope = function(omega)
-        above = (value >= 0.0) == rising
-        low, high = np.where(above, low, omega), np.where(above, omega, high)
-        with np.errstate(divide='ignore', invalid='ignore'):
-            step = omega - value / slope
-        following = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
-        settled = np.abs(following - omega) <= 1e-15 * omega
-        omega = following
-        if settled.all():
-            break
-    return omega
+
+    def inside(omega: Array) -> Array:
+        response = receptance(sections, 1j * omega)
+        if not damped:
+            return np.asarray(-1.0 - 2.0 * stiffness * response.real)
+        needed = -(1.0 / response).real
+        lower: Array = np.minimum(needed, 2.0 * stiffness - needed)
+        return lower
+
+    positive = inside(grid) > 0.0
+    cell = np.flatnonzero(positive[1:] != positive[:-1])
+    low, high, rising = grid[cell], grid[cell + 1], positive[cell + 1]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        above = (inside(middle) > 0.0) == rising
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return 0.5 * (low + high)
 
 
-def _poles_and_zeros(equation: CharacteristicEquation) -> tuple[Any, Any]:
-    """Heights and half-widths, rad/s, of everything that turns the phase of G."""
-    free = equation.delay_free_roots(np.zeros(1))[0]
-    points = np.concatenate((free, np.roots(equation.flexible)))
-    return np.abs(points.imag), np.maximum(np.abs(points.real), 1e-9 * np.abs(points))
+def _spread(grid: Array, edges: Array, points: int) -> Array:
+    """Frequencies inside the bands, as dense as the grid is there."""
+    bands = edges.reshape(-1, 2) if edges.size % 2 == 0 else np.zeros((0, 2))
+    share = points // max(len(bands), 1)
+    parts = [np.zeros(0)]
+    for low, high in bands:
+        inside = grid[(grid > low) & (grid < high)]
+        known = np.concatenate(([low], inside, [high]))
+        parts.append(
+            np.interp(np.linspace(0, known.size - 1, share), np.arange(known.size), known)
+        )
+    return np.concatenate(parts)
 
 
-def _near_poles_and_zeros(equation: CharacteristicEquation, low: float, high: float) -> Array:
-    """Frequencies low..high between which no pole or zero turns the phase by more than a step."""
-    height, width = _poles_and_zeros(equation)
-    angle = np.arange(-0.5 * np.pi + _PHASE_STEP / 2.0, 0.5 * np.pi, _PHASE_STEP)
-    near = (height[:, None] + width[:, None] * np.tan(angle)).ravel()
-    inside: Array = near[(near > low) & (near < high)]
-    return inside
+def _damped(  # noqa: PLR0913, PLR0917 -- the boundary's facts
+    machine: Machine, process: ProcessDamping, sections: Array, frequency: Array, lobes: int,
+    limit: float,
+) -> LobeBoundary:  # fmt: skip
+    """The boundary with process damping: there along one solution of the phase, back the other.
 
-
-def _frequency_grid(equation: CharacteristicEquation, longest: float, shortest: float) -> Array:
-    """Frequencies on which neither omega tau nor the phase of a pole or zero steps far.
-
-    The grid ends past the last minimum of Re G, omega^2 = omega_n^2 (1 + 2 zeta), and two more
-    turns: what lies beyond is deeper.
+    With q = Im(1/G) / Re(1/G) the phase obeys rho theta - q + R cos(theta - phi) = 0, where
+    R^2 = 1 + q^2 and tan phi = 1/q; it has one minimum in a lobe, and a zero on either side of
+    it where that is negative.
     """
-    free = equation.delay_free_roots(np.zeros(1))
-    top = 2.0 * float(np.abs(free).max()) + 4.0 * np.pi / shortest
-    even = np.linspace(0.0, top, math.ceil(top * longest / _PHASE_STEP) + 2)[1:]
-    return np.unique(np.concatenate((even, _near_poles_and_zeros(equation, 0.0, top))))
+    rho = process.per_width_and_delay / machine.cutting_coefficient
+    inverse = 1.0 / receptance(sections, 1j * frequency)
+    q = inverse.imag / inverse.real
+    begin = 2.0 * np.pi * np.arange(lobes)[:, None]
 
+    def excess(theta: Array) -> Array:
+        return np.asarray(np.sin(theta) + rho * theta - q * (1.0 - np.cos(theta)))
 
-def _dense_where_steep(
-    equation: CharacteristicEquation, low: float, high: float, points: int
-) -> Array:
-    """Frequencies low..high, equally spaced in the phase that poles and zeros contribute."""
-    height, width = _poles_and_zeros(equation)
-    near = _near_poles_and_zeros(equation, low, high)
-    grid = np.unique(np.concatenate((near, np.linspace(low, high, 33))))
-    phase = np.arctan((grid[:, None] - height) / width).sum(axis=1)
-    phase += np.pi * (grid - low) / (high - low)
-    return np.interp(np.linspace(phase[0], phase[-1], points), phase, grid)
+    with np.errstate(invalid='ignore'):
+        lowest: Any = np.arctan2(1.0, q) + np.pi - np.arcsin(rho / np.hypot(1.0, q))
+    lowest = begin + np.mod(lowest, 2.0 * np.pi)
+    there = excess(lowest) < 0.0
+    rows = []
+    for outer in (begin + 1e-9, begin + 2.0 * np.pi):
+        positive: Any = np.broadcast_to(outer, lowest.shape)
+        negative: Any = lowest + 0.0
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (positive + negative)
+            above = excess(middle) > 0.0
+            positive, negative = (
+                np.where(above, middle, positive),
+                np.where(above, negative, middle),
+            )
+        theta = np.where(there, 0.5 * (positive + negative), np.nan)
+        depth = -inverse.real / (machine.cutting_coefficient * (1.0 - np.cos(theta)))
+        theta = np.where(depth <= limit, theta, np.nan)
+        rows.append((60.0 * frequency / theta, np.where(depth <= limit, depth, np.nan)))
+    (speed, depth), (speed_back, depth_back) = rows
+    shape = (lobes, 2 * frequency.size)
+    return LobeBoundary(
+        np.hstack((speed, speed_back[:, ::-1])),
+        np.hstack((depth, depth_back[:, ::-1])),
+        np.broadcast_to(np.arange(lobes)[:, None], shape),
+        np.broadcast_to(np.concatenate((frequency, frequency[::-1])), shape),
+    )

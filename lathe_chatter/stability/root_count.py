@@ -1,31 +1,33 @@
 """How many characteristic roots lie to the right of a vertical line: a proof, not a search.
 
-The argument principle counts the zeros of D(s) by the turns that D makes along the line
-Re s = sigma. The line is cut into pieces on each of which a bound on the second derivative
-keeps D inside a convex set that excludes 0, so the angle between its ends is the whole change;
-a piece where the bound does not hold is halved. Only rounding is left out of the proof.
+The argument principle: along the line Re s = sigma the function F turns about 0 once for each of
+its zeros to the right, less its poles there, which are known. The line is cut into pieces on each
+of which a bound on the second derivative keeps F inside a convex set that excludes 0, so that the
+angle between its ends is the whole change. Only rounding is left out of the proof.
 """
 
 from __future__ import annotations
 
+import cmath
+import math
+
 import numpy as np
-from numpy.typing import NDArray
 
 from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Machine
-from lathe_chatter.stability.characteristic import (
-    CharacteristicEquation,
-    Complex,
-    checked,
-    polynomial,
-)
+from lathe_chatter.stability.characteristic import NO_DAMPING, Cuts, ProcessDamping
+from lathe_chatter.stability.sections import ALPHA, BETA, DAMPING, STIFFNESS, inverse
 
 UNDECIDED = -1
 """The count where the line passes through a root, within rounding."""
-_HALVINGS = 60
-_GRADING = np.array([0.5, 0.25, 0.125, 0.0625])
 _PIECE = 1.2
 """Length of a first piece in radians of the delayed phase omega tau."""
+_GROWTH, _SHRINKAGE = 1.7, 0.45
+"""Of the next piece after one on which 0 is excluded, and after one on which it is not."""
+_MOST_DOUBLINGS = 60
+_SMALLEST = 1e-16
+"""Piece, relative to the frequency, that still means something."""
 
 
 def count_roots_right_of(
@@ -35,6 +37,7 @@ def count_roots_right_of(
     real_part: float,
     *,
     seated: bool,
+    process: ProcessDamping = NO_DAMPING,
 ) -> int:
     """How many roots have a real part above `real_part`: 0 at 0 proves that a cut is stable.
 
@@ -44,6 +47,7 @@ def count_roots_right_of(
         depth_of_cut: w, m.
         real_part: Real part of the line, 1/s.
         seated: Whether the workpiece rests on its bearing.
+        process: Process damping.
 
     Returns:
         The number with multiplicity, conjugates included; -1 where a root lies on the line
@@ -52,139 +56,195 @@ def count_roots_right_of(
     Raises:
         ParameterError: If speed or depth is not allowed.
     """
-    equation = CharacteristicEquation.of(machine, seated=seated)
-    delay = 60.0 / np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
-    depth = np.atleast_1d(checked('depth_of_cut', depth_of_cut))
+    cuts = Cuts.of(machine, spindle_speed_rpm, depth_of_cut, seated=seated, process=process)
     line = np.array([float(real_part)])
-    return int(count_right_of(equation, machine.cutting_coefficient * depth, delay, line)[0])
+    return int(count_right_of(cuts, line)[0])
 
 
-def count_right_of(
-    equation: CharacteristicEquation,
-    cutting_stiffness: Array,
-    delay: Array,
-    real_part: Array,
-    near: tuple[Array, Array] | None = None,
-) -> Integers:
-    """The number of roots, with multiplicity, whose real part exceeds `real_part`.
+def count_right_of(cuts: Cuts, real_part: Array) -> Integers:
+    """The number of roots of each cut, with multiplicity, whose real part exceeds `real_part`.
 
     Args:
-        equation: Machine and contact regime.
-        cutting_stiffness: C w (n,), N/m.
-        delay: tau (n,), s.
-        real_part: sigma of the line (n,), 1/s.
-        near: The frequency (n,), rad/s, of a root that is known to lie close to the line, and
-            its distance from it (n,), 1/s. Only for speed.
+        cuts: n of them.
+        real_part: sigma of each line (n,), 1/s.
 
     Returns:
         Counts (n,); `UNDECIDED` where a root lies on the line within rounding.
     """
-    count = cutting_stiffness.size
-    far = _enclosing_radius(equation, cutting_stiffness, delay, real_part)
-    owner, low, high = _first_pieces(delay, far, *(near or (np.zeros(count), far)))
-
-    def value(which: Integers, frequency: Array) -> Complex:
-        s = real_part[which] + 1j * frequency
-        return equation.value_and_slope(s, cutting_stiffness[which], delay[which]).value
-
-    at_low, at_high = value(owner, low), value(owner, high)
-    turned = np.zeros(count)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        at_middle, excluded = _piece(
-            equation,
-            cutting_stiffness[owner],
-            delay[owner],
-            real_part[owner] + 1j * middle,
-            0.5 * (high - low),
-        )
-        angle = np.angle(at_high[excluded] * np.conj(at_low[excluded]))
-        turned += np.bincount(owner[excluded], angle, count)
-        split = ~excluded
-        if not split.any():
-            break
-        owner = np.tile(owner[split], 2)
-        low, high = (
-            np.concatenate((low[split], middle[split])),
-            np.concatenate((middle[split], high[split])),
-        )
-        at_low, at_high = (
-            np.concatenate((at_low[split], at_middle[split])),
-            np.concatenate((at_middle[split], at_high[split])),
-        )
-    end = real_part + 1j * far
-    leading = equation.uncoupled[0]
-    at_end = value(np.arange(count), far)
-    arc = 4.0 * np.angle(end) + np.angle(at_end / (leading * end**4))
-    found: Integers = np.rint((arc - turned) / np.pi).astype(np.int64)
-    if split.any():
-        found[owner] = UNDECIDED
+    found = np.empty(cuts.delay.size, np.int64)
+    _count_all(
+        cuts.sections, cuts.modes, cuts.machine, cuts.stiffness, cuts.damping, cuts.delay,
+        real_part, found,
+    )  # fmt: skip
     return found
 
 
-def _enclosing_radius(
-    equation: CharacteristicEquation, cutting_stiffness: Array, delay: Array, real_part: Array
-) -> Array:
-    """A circle that holds every root right of the line (Fujiwara's bound)."""
-    leading = equation.uncoupled[0]
-    both = cutting_stiffness * (1.0 + np.exp(-delay * real_part)) / leading
-    bound = np.tile(np.array(equation.uncoupled[1:]) / leading, (delay.size, 1))
-    bound[:, 1:] += np.outer(both, equation.flexible)
-    radius: Array = 2.0 * np.max(bound ** (1.0 / np.arange(1.0, 5.0)), axis=1)
-    return radius
+@compiled(nogil=True)
+def _count_all(
+    sections: Array, modes: Integers, machine: Integers, stiffness: Array, damping: Array,
+    delay: Array, real_part: Array, found: Integers,
+) -> None:  # fmt: skip
+    """`count_to_the_right` of many cuts."""
+    for cut in range(len(delay)):
+        which = machine[cut]
+        found[cut] = count_to_the_right(
+            sections[which], modes[which], stiffness[cut], damping[cut], delay[cut],
+            real_part[cut],
+        )  # fmt: skip
 
 
-def _first_pieces(
-    delay: Array, far: Array, near: Array, distance: Array
-) -> tuple[Integers, Array, Array]:
-    """Pieces of 0..far: the number of the cut that each belongs to, its lower and upper end.
+@compiled(borrows=True)
+def count_to_the_right(
+    sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float
+) -> int:
+    """The number of zeros of D with Re s > sigma."""
+    count = _poles_to_the_right(sections, modes, sigma)
+    if stiffness == 0.0 and damping == 0.0:
+        return count
+    far = _last_frequency(sections, modes, stiffness, damping, delay, sigma)
+    if far < 0.0:
+        return UNDECIDED
+    echo = stiffness * math.exp(-delay * sigma)
+    omega, length, turned = 0.0, _PIECE / delay, 0.0
+    here = _value(sections, modes, stiffness, damping, delay, sigma, omega, echo)
+    while omega < far:
+        length = min(length, far - omega)
+        if length <= _SMALLEST * (omega + abs(sigma)):
+            return UNDECIDED
+        half = 0.5 * length
+        if not _excludes_zero(
+            sections, modes, stiffness, damping, delay, sigma, omega + half, echo, half
+        ):
+            length *= _SHRINKAGE
+            continue
+        omega = far if length == far - omega else omega + length
+        there = _value(sections, modes, stiffness, damping, delay, sigma, omega, echo)
+        turned += cmath.phase(there * here.conjugate())
+        here = there
+        length *= _GROWTH
+    # Beyond, F stays within 1 of its limit, which is 1.
+    return count - round((turned - cmath.phase(here)) / math.pi)
 
-    A piece at height y above a root may be about sqrt(y / tau) long, which grades the pieces on
-    both sides of it.
+
+@compiled(inline=True, borrows=True)
+def _value(
+    sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float,
+    omega: float, echo: float,
+) -> complex:  # fmt: skip
+    """F(sigma + i omega), with K e^(-sigma tau) known. Real numbers: half the time of complex."""
+    real, imaginary = 0.0, 0.0
+    square = sigma * sigma - omega * omega
+    for j in range(modes):
+        c, alpha = sections[j, DAMPING], sections[j, ALPHA]
+        x = square + c * sigma + sections[j, STIFFNESS]
+        y = (2.0 * sigma + c) * omega
+        per = 1.0 / (x * x + y * y)
+        u, v = alpha * sigma + sections[j, BETA], alpha * omega
+        real += (u * x + v * y) * per
+        imaginary += (v * x - u * y) * per
+    phase = omega * delay
+    a = stiffness - echo * math.cos(phase) + damping * sigma
+    b = echo * math.sin(phase) + damping * omega
+    return complex(1.0 + a * real - b * imaginary, a * imaginary + b * real)
+
+
+@compiled(borrows=True)
+def _poles_to_the_right(sections: Array, modes: int, sigma: float) -> int:
+    """The number of zeros of A with Re s > sigma."""
+    count = 0
+    for j in range(modes):
+        half = 0.5 * sections[j, DAMPING]
+        rest = half * half - sections[j, STIFFNESS]
+        apart = math.sqrt(rest) if rest > 0.0 else 0.0
+        count += int(-half + apart > sigma) + int(-half - apart > sigma)
+    return count
+
+
+@compiled(borrows=True)
+def _last_frequency(
+    sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float
+) -> float:
+    """Where |F - 1| < 1 from here up; negative where there is no such place.
+
+    With |s| >= 2 |pole| a denominator is at least |s|^2 / 4. The alphas add up to nothing, so
+    only what follows their leading term counts.
     """
-    count = delay.size
-    # The outer half of the line holds no surprise: it may start as one piece.
-    pieces = np.maximum(np.ceil(far * delay / (2.0 * _PIECE)), 1.0).astype(np.int64)
-    even_owner = np.repeat(np.arange(count), pieces)
-    place = np.arange(even_owner.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    even = place * _PIECE / delay[even_owner]
-    powers = (distance * delay)[:, None] ** _GRADING / delay[:, None]
-    graded = (near[:, None] + np.hstack((-powers, powers))).ravel()
-    graded_owner = np.repeat(np.arange(count), 2 * _GRADING.size)
-    inside = (graded > 0.0) & (graded < far[graded_owner])
-    owner = np.concatenate((even_owner, graded_owner[inside]))
-    low = np.concatenate((even, graded[inside]))
-    order = np.lexsort((low, owner))
-    owner, low = owner[order], low[order]
-    last = np.append(owner[1:] != owner[:-1], True)
-    return owner, low, np.where(last, far[owner], np.roll(low, -1))
+    highest, height, steep, left = 0.0, 0.0, 0.0, 0.0
+    for j in range(modes):
+        c, k = sections[j, DAMPING], sections[j, STIFFNESS]
+        highest = max(highest, 0.5 * c + math.sqrt(abs(0.25 * c * c - k)), math.sqrt(k))
+        height += abs(sections[j, BETA]) + abs(sections[j, ALPHA]) * c
+        steep += abs(sections[j, ALPHA]) * k
+        left += sections[j, ALPHA]
+    strongest = stiffness * (1.0 + math.exp(-delay * sigma))
+    far = 2.0 * highest
+    for _ in range(_MOST_DOUBLINGS):
+        distance = math.hypot(far, sigma)
+        receptance = 4.0 * (height + steep / distance) / (distance * distance)
+        receptance += abs(left) / distance
+        if (strongest + damping * distance) * receptance < 0.9:
+            return far
+        far *= 1.3
+    return -1.0
 
 
-def _piece(
-    equation: CharacteristicEquation, stiffness: Array, delay: Array, s: Complex, half: Array
-) -> tuple[Complex, NDArray[np.bool_]]:
-    """D in the middle of pieces, and whether 0 is excluded from each whole piece.
+@compiled(inline=True, borrows=True)
+def _excludes_zero(
+    sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float,
+    omega: float, echo: float, half: float,
+) -> bool:  # fmt: skip
+    """Whether F is not 0 anywhere on sigma + i (omega - half ... omega + half).
 
-    With e^(-i y tau) = 1 - i y tau + rho, |rho| <= (y tau)^2 / 2, the tangent D + i y D' misses D
-    by less than `miss` on |y| <= half.
+    The tangent at the middle misses F by less than half^2 / 2 times the largest second
+    derivative; where even |F - 1| < 1 nothing more is to be asked.
     """
-    a, p = equation.uncoupled, equation.flexible
-    a1, a2, a3 = equation.uncoupled_derivatives
-    p1 = equation.flexible_slope
-    kp = stiffness * polynomial(p, s)
-    kp1 = stiffness * polynomial(p1, s)
-    kp2 = stiffness * 2.0 * p[0]
-    echo = np.exp(-delay * s)
-    strength = np.abs(echo)
-    value = polynomial(a, s) + kp * (1.0 - echo)
-    slope = polynomial(a1, s) + kp1 * (1.0 - echo) + kp * delay * echo
-    cubic = np.abs(polynomial(a3, s)) / 3.0 + half * 24.0 * a[0] / 12.0
-    smooth = np.abs(polynomial(a2, s)) + kp2 + half * cubic
-    delayed = np.abs(kp) * delay**2 + 2.0 * np.abs(kp1) * delay + kp2
-    miss = 0.5 * half**2 * (smooth + strength * delayed)
-    # The distance of 0 from the tangent's piece {D + i y D'}.
-    size = np.abs(slope)
-    nearest = value / np.where(size > 0.0, 1j * slope, 1.0)
-    beyond = np.maximum(np.abs(nearest.real) - half, 0.0)
-    distance = np.where(size > 0.0, size * np.hypot(nearest.imag, beyond), np.abs(value))
-    return value, distance > miss
+    real, imaginary, slope, slope_i = 0.0, 0.0, 0.0, 0.0
+    most, steepest, bend = 0.0, 0.0, 0.0
+    square, rise_i = sigma * sigma - omega * omega, 2.0 * omega
+    for j in range(modes):
+        c, alpha = sections[j, DAMPING], sections[j, ALPHA]
+        x = square + c * sigma + sections[j, STIFFNESS]
+        rise = 2.0 * sigma + c
+        y = rise * omega
+        square_size = x * x + y * y
+        size = math.sqrt(square_size)
+        climb = math.sqrt(rise * rise + rise_i * rise_i)
+        least = size - half * (climb + half)
+        if least <= 0.1 * size:
+            return False
+        per = 1.0 / square_size
+        u, v = alpha * sigma + sections[j, BETA], alpha * omega
+        part, part_i = (u * x + v * y) * per, (v * x - u * y) * per
+        # G_j' = (alpha - G_j d') / d
+        top = alpha - part * rise + part_i * rise_i
+        top_i = -part * rise_i - part_i * rise
+        real += part
+        imaginary += part_i
+        slope += (top * x + top_i * y) * per
+        slope_i += (top_i * x - top * y) * per
+        # The largest part, slope and bend of this section on the piece.
+        least, climb, alpha = 1.0 / least, climb + 2.0 * half, abs(alpha)
+        up = (math.sqrt(u * u + v * v) + alpha * half) * least
+        most += up
+        steepest += (alpha + up * climb) * least
+        bend += 2.0 * (alpha * climb * least + up * (1.0 + climb * climb * least)) * least
+    phase = omega * delay
+    cosine, sine = echo * math.cos(phase), echo * math.sin(phase)
+    a = stiffness - cosine + damping * sigma
+    b = sine + damping * omega
+    push = delay * echo + damping
+    pushed = math.sqrt(a * a + b * b) + half * push
+    if pushed * most < 0.95:
+        return True
+    value = complex(1.0 + a * real - b * imaginary, a * imaginary + b * real)
+    rising = complex(delay * cosine + damping, -delay * sine)
+    steep = rising * complex(real, imaginary) + complex(a, b) * complex(slope, slope_i)
+    miss = pushed * bend + 2.0 * push * steepest + delay * delay * echo * most
+    miss *= 0.5 * half * half
+    # The distance of 0 from the tangent's piece {F + i y F'}.
+    size_of_slope = abs(steep)
+    if size_of_slope == 0.0:
+        return abs(value) > miss
+    nearest = -1j * value * inverse(steep)
+    beyond = max(abs(nearest.real) - half, 0.0)
+    return size_of_slope * math.sqrt(nearest.imag**2 + beyond * beyond) > miss

@@ -1,12 +1,17 @@
 """The depth that is safe with a bearing clearance: open limit, seated limit and seating line.
 
-The mean cutting force C w f pushes the workpiece by C w f / k_wp. As long as that is less than
-the clearance gamma the workpiece floats and the open limit holds; from the seating line
+The mean cutting force C w f pushes the workpiece at its bearing by C w f / k_wp. As long as that
+is less than the clearance gamma the workpiece floats and the open limit holds; from the seating
+line
 
     w = k_wp gamma / (C f)
 
 on it rests on its bearing and the seated limit holds, which may be lower or higher. This judges
 small disturbances: a hard knock can drive a floating workpiece against its bearing.
+
+Without a mean force and without clearance the workpiece stands exactly where its bearing begins:
+the smallest vibration touches it in every cycle, and what holds then is neither limit, nor the
+smaller of the two. Nothing is then said to be safe.
 """
 
 from __future__ import annotations
@@ -21,8 +26,8 @@ from numpy.typing import ArrayLike
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.stability.characteristic import checked
-from lathe_chatter.stability.lobes import critical_depth, critical_depths
+from lathe_chatter.stability.characteristic import ProcessDamping, checked
+from lathe_chatter.stability.critical_depth import critical_depth, critical_depths
 
 _CLEARANCE = Quantity('bearing clearance gamma', 'm')
 _FEED = Quantity('feed per revolution f', 'm')
@@ -34,7 +39,7 @@ class SafeLimit:
 
     Attributes:
         spindle_speed_rpm: rev/min.
-        depth_of_cut: Every smaller depth is stable, m.
+        depth_of_cut: Every smaller depth is stable, m; 0 where no depth is known to be.
         open_limit: Critical depth while the workpiece floats, m.
         seated_limit: Critical depth while it rests on its bearing, m.
         seating_line: Depth from which on it rests, m; infinite where it never does.
@@ -52,7 +57,7 @@ class ContactAt(NamedTuple):
 
     Attributes:
         seated: Whether the workpiece rests on its bearing.
-        limit: The critical depth in this regime, m.
+        limit: The critical depth in this regime, m; 0 where no depth is known to be stable.
         stable: Whether the depth of the cut is below it.
     """
 
@@ -81,7 +86,27 @@ def seating_depth(machine: Machine, bearing_clearance: float, feed: float) -> fl
     force_per_depth = machine.cutting_coefficient * _FEED.check('feed', feed)
     if force_per_depth == 0.0:
         return math.inf
-    return machine.workpiece.stiffness * clearance / force_per_depth
+    compliance = sum(m.bearing * m.force / m.stiffness for m in machine.workpiece.modes)
+    # A force that lifts the workpiece off its bearing never seats it.
+    return clearance / (force_per_depth * compliance) if compliance > 0.0 else math.inf
+
+
+def _on_the_edge(cut: Cut, *, tool_leaves_cut: bool) -> bool:
+    """Whether the workpiece stands exactly where its bearing begins, on one side."""
+    without_mean = not tool_leaves_cut or cut.feed_speed == 0.0
+    gap = cut.bearing_contact is BearingContact.GAP
+    return gap and without_mean and cut.bearing_clearance == 0.0
+
+
+def _seats(cut: Cut) -> bool:
+    """Whether the mean force can close a clearance."""
+    return cut.bearing_contact in {'gap', 'both_sides'}
+
+
+def _always_seated(cut: Cut) -> bool:
+    """Whether the bearing carries at any force: without clearance on either side too."""
+    both = cut.bearing_contact == 'both_sides' and cut.bearing_clearance == 0.0
+    return both or cut.bearing_contact is BearingContact.SEATED
 
 
 def safe_limit(
@@ -108,16 +133,19 @@ def safe_limit(
     """
     given = cut.spindle_speed_rpm if spindle_speed_rpm is None else spindle_speed_rpm
     speeds = checked('spindle_speed_rpm', given)
-    floating = critical_depths(machine, speeds, seated=False)
-    seated = critical_depths(machine, speeds, seated=True)
+    process = ProcessDamping.of(cut)
+    floating = critical_depths(machine, speeds, seated=False, process=process)
+    seated = critical_depths(machine, speeds, seated=True, process=process)
     line = np.full(speeds.shape, math.inf)
-    if cut.bearing_contact is BearingContact.SEATED:
+    if _always_seated(cut):
         line = np.zeros(speeds.shape)
-    elif cut.bearing_contact is BearingContact.GAP and tool_leaves_cut:
+    elif _seats(cut) and tool_leaves_cut:
         # The line is inverse to the feed, which is inverse to the speed.
         at_one = seating_depth(machine, cut.bearing_clearance, 60.0 * cut.feed_speed)
         line = at_one * speeds
     depth = np.where(floating <= line, floating, np.maximum(line, seated))
+    if _on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
+        depth = np.zeros(speeds.shape)
     return SafeLimit(speeds, depth, floating, seated, line)
 
 
@@ -133,8 +161,12 @@ def contact_at(machine: Machine, cut: Cut, *, tool_leaves_cut: bool = True) -> C
         The contact at the mean force, the critical depth in that contact, and the verdict for
         small disturbances.
     """
-    seated = cut.bearing_contact is BearingContact.SEATED
-    if cut.bearing_contact is BearingContact.GAP and tool_leaves_cut:
+    seated = _always_seated(cut)
+    if not seated and _seats(cut) and tool_leaves_cut:
         seated = cut.depth_of_cut >= seating_depth(machine, cut.bearing_clearance, cut.feed)
-    limit = critical_depth(machine, cut.spindle_speed_rpm, seated=seated)
+    limit = critical_depth(
+        machine, cut.spindle_speed_rpm, seated=seated, process=ProcessDamping.of(cut)
+    )
+    if _on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
+        limit = 0.0
     return ContactAt(seated, limit, cut.depth_of_cut < limit)

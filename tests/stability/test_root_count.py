@@ -8,7 +8,7 @@ from support.machines import random_machine
 
 from lathe_chatter.model import Machine
 from lathe_chatter.stability import count_roots_right_of, critical_depth, leading_roots
-from lathe_chatter.stability.characteristic import CharacteristicEquation
+from lathe_chatter.stability.characteristic import Cuts
 from lathe_chatter.stability.root_count import UNDECIDED, count_right_of
 
 
@@ -31,25 +31,12 @@ def test_without_delay_the_count_is_that_of_a_polynomial() -> None:
 
 def test_a_line_through_a_root_is_undecided() -> None:
     machine = Machine()
-    equation = CharacteristicEquation.of(machine, seated=False)
+    cut = Cuts.of(machine, 3000.0, 1e-3, seated=False)
     root = leading_roots(machine, 3000.0, 1e-3, seated=False, count=1)[0]
-    arguments = (np.array([machine.cutting_stiffness(1e-3)]), np.array([0.02]))
-    exactly = count_right_of(equation, *arguments, np.array([root.real]))[0]
+    exactly = count_right_of(cut, np.array([root.real]))[0]
     assert exactly in (UNDECIDED, 0, 2)
     for offset, expected in [(1e-9, 0), (-1e-9, 2)]:
-        assert count_right_of(equation, *arguments, np.array([root.real + offset]))[0] == expected
-
-
-def test_a_known_root_only_speeds_the_count_up() -> None:
-    rng = np.random.default_rng(5)
-    machine = random_machine(rng)
-    equation = CharacteristicEquation.of(machine, seated=True)
-    stiffness = machine.cutting_coefficient * rng.uniform(1e-4, 2e-3, 50)
-    delay, line = rng.uniform(0.005, 0.2, 50), rng.uniform(-30.0, 10.0, 50)
-    near = (rng.uniform(100.0, 900.0, 50), np.full(50, 1e-6))
-    plain = count_right_of(equation, stiffness, delay, line)
-    assert np.array_equal(plain, count_right_of(equation, stiffness, delay, line, near))
-    assert plain.max() > 2
+        assert count_right_of(cut, np.array([root.real + offset]))[0] == expected
 
 
 @pytest.mark.parametrize('damping', [0.05, 0.001])
@@ -59,8 +46,6 @@ def test_a_pair_crosses_the_axis_at_the_critical_depth(damping: float) -> None:
         machine = random_machine(rng, damping=damping)
         rpm, seated = np.exp(rng.uniform(np.log(60.0), np.log(30000.0))), bool(rng.integers(2))
         critical = critical_depth(machine, rpm, seated=seated)
-        equation = CharacteristicEquation.of(machine, seated=seated)
         depths = critical * np.array([0.3, 0.9, 1.0 - 1e-8, 1.0 + 1e-8])
-        stiffness = machine.cutting_coefficient * depths
-        counts = count_right_of(equation, stiffness, np.full(4, 60.0 / rpm), np.zeros(4))
+        counts = count_right_of(Cuts.of(machine, rpm, depths, seated=seated), np.zeros(4))
         assert counts.tolist() == [0, 0, 0, 2]

@@ -3,13 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import (
-    dominant_eigenvalue,
     floquet,
     rightmost_root,
     varied_growth_rates,
@@ -117,23 +115,3 @@ def test_a_chart_holds_the_growth_rate_of_each_point() -> None:
 def test_a_chart_of_an_impossible_depth_is_refused() -> None:
     with pytest.raises(ParameterError, match='depth_of_cut'):
         varied_growth_rates(Machine(), Cut(), [3000.0], [-1.0], seated=False)
-
-
-def _random_matrix(size: int, seed: int) -> Array:
-    matrix: Array = np.random.default_rng(seed).standard_normal((size, size))
-    return matrix
-
-
-@pytest.mark.parametrize('size', [1, 2, 7, 60])
-def test_the_dominant_eigenvalue_is_that_of_lapack(size: int) -> None:
-    matrix = _random_matrix(size, size)
-    found = dominant_eigenvalue(matrix)
-    values = np.linalg.eigvals(matrix)
-    assert abs(found) == pytest.approx(np.abs(values).max(), rel=1e-10)
-    assert np.abs(values - found).min() < 1e-10 * abs(found)
-
-
-def test_an_invariant_subspace_ends_the_search() -> None:
-    matrix = np.zeros((50, 50))
-    matrix[0, 1], matrix[1, 0] = -2.0, 2.0
-    assert dominant_eigenvalue(matrix) == pytest.approx(2j)
