@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -67,18 +68,28 @@ class Timeline:
         """Blocks whose simulated time is not after that of the block before."""
         return np.flatnonzero(self.first[1:] <= self.last[:-1]) + 1
 
+    @cached_property
+    def _known_offsets(self) -> Integers:
+        return np.unique(self.offsets)
+
+    @cached_property
+    def _stepped_at(self) -> list[int]:
+        """Blocks before which the clock was set, the last first."""
+        found: list[int] = (np.flatnonzero(np.diff(self.offsets))[::-1] + 1).tolist()
+        return found
+
     def steady(self, found: Placed) -> tuple[int, int]:
         """When a message was received and published by the clock without steps back, ns."""
         raw = found.raw
         if not len(self.places):
             return raw.log_time, raw.publish_time
         near = max(int(np.searchsorted(self.places, found.place)) - 1, 0)
-        offsets = np.unique(self.offsets)
+        offsets = self._known_offsets
         far = np.abs(raw.log_time - offsets - self.received[near])
         offset = int(offsets[np.argmin(far)])
         received = raw.log_time - offset
         # What a publisher keeps for late readers may be of before a step.
-        for k in np.flatnonzero(np.diff(self.offsets))[::-1] + 1:
+        for k in self._stepped_at:
             step = abs(int(self.offsets[k] - self.offsets[k - 1]))
             published = raw.publish_time - int(self.offsets[k])
             # The size of a step is known to some ms, and the other side of it is a step away.
@@ -108,8 +119,12 @@ class Timeline:
             blocks: Of one session of the lathe; not empty.
         """
         times = self.received[blocks]
-        since = (times - times[0]).astype(float)
-        return float(np.interp(float(received - int(times[0])), since, self.last[blocks]))
+        after = min(max(int(np.searchsorted(times, received)), 1), len(times))
+        near = slice(after - 1, after + 1)  # a run has too many to look at all for each message
+        since = (times[near] - times[after - 1]).astype(float)
+        return float(
+            np.interp(float(received - int(times[after - 1])), since, self.last[blocks][near])
+        )
 
 
 def read_timeline(

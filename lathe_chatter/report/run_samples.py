@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.arrays import Array
 from lathe_chatter.samples.continuity import Continuity
 from lathe_chatter.samples.extremes import TIME, Extremes
+
+
+_AT_ONCE = 50_000
+"""Samples that are looked at together: more would only take more memory."""
 
 
 class SampleBlocks(Protocol):
@@ -26,14 +29,6 @@ class SampleBlocks(Protocol):
     @property
     def samples(self) -> Array:
         """All samples (n, k)."""
-
-    @property
-    def rows(self) -> Integers:
-        """Samples in each block (blocks,)."""
-
-    @property
-    def log_times(self) -> Integers:
-        """When each block was received, ns (blocks,)."""
 
 
 class RunSamples:
@@ -55,47 +50,29 @@ class RunSamples:
         """Let them pass by."""
         self._blocks = blocks
         self.first = 0.0
-        received: list[Integers] = [np.zeros(0, np.int64)]
-        ends: list[Array] = [np.zeros(0)]
         continuity = Continuity(remember=True)
         self.extremes = Extremes.none((TIME,))
         for block in blocks():
             samples, columns = block.samples, tuple(block.columns)
             if not len(samples):
                 continue
-            times = samples[:, columns.index(TIME)]
-            rows = np.asarray(block.rows)
-            received.append(np.array(block.log_times)[rows > 0])
-            ends.append(times[np.cumsum(rows)[rows > 0] - 1])
             if not continuity.samples:
-                self.first = float(times[0])
+                self.first = float(samples[0, columns.index(TIME)])
                 self.extremes = Extremes.none(columns)
             places = [columns.index(name) for name in self.extremes.columns]
-            self.extremes = self.extremes.extended(samples[:, places], continuity)
+            for start in range(0, len(samples), _AT_ONCE):
+                part = samples[start : start + _AT_ONCE][:, places]
+                self.extremes = self.extremes.extended(part, continuity)
         self.count, self.last = continuity.samples, continuity.last or 0.0
         self.gaps, self.restarts = continuity.gap_places, continuity.restart_places
         self._step = continuity.step
-        self._received, self._ends = np.concatenate(received), np.concatenate(ends)
 
     @classmethod
     def of(cls, signals: Mapping[str, Array]) -> RunSamples:
         """Of signals (n,) by name that are in memory already."""
         samples = np.column_stack(list(signals.values()))
-        rows = np.array([len(samples)])
-        block = _InMemory(tuple(signals), samples, rows, np.zeros(1, np.int64))
+        block = _InMemory(tuple(signals), samples)
         return cls(lambda: [block])
-
-    def simulated_time(self, log_times: ArrayLike) -> Array:
-        """Simulated times when other things were recorded, s: those of the blocks about them.
-
-        Args:
-            log_times: Of these, ns since the epoch (m,).
-        """
-        origin = self._received[0] if len(self._received) else 0
-        relative = (self._received - origin).astype(float)
-        asked = (np.asarray(log_times, np.int64) - origin).astype(float)
-        found: Array = np.interp(asked, relative, self._ends)
-        return found
 
     def between(self, spans: Sequence[tuple[float, float]]) -> list[dict[str, Array]]:
         """Every sample within some spans of simulated time: after the begin, up to the end.
@@ -135,5 +112,3 @@ class RunSamples:
 class _InMemory(NamedTuple):
     columns: tuple[str, ...]
     samples: Array
-    rows: Integers
-    log_times: Integers

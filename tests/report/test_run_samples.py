@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.arrays import Array
 from lathe_chatter.report.run_samples import RunSamples
 
 RATE = 1000.0
@@ -17,19 +17,10 @@ RATE = 1000.0
 class _Blocks(NamedTuple):
     columns: tuple[str, ...]
     samples: Array
-    rows: Integers
-    log_times: Integers
 
 
-def blocks(parts: Iterable[Array], size: int = 10) -> list[_Blocks]:
-    """Samples (n, 2) as a record has them: received a second after they were taken."""
-    found = []
-    for part in parts:
-        rows = np.full(-(-len(part) // size), size)
-        rows[-1] = len(part) - size * (len(rows) - 1)
-        ends = part[np.cumsum(rows) - 1, 0]
-        found.append(_Blocks(('time', 'force'), part, rows, np.rint(1e9 * (ends + 1)).astype(int)))
-    return found
+def blocks(parts: Iterable[Array]) -> list[_Blocks]:
+    return [_Blocks(('time', 'force'), part) for part in parts]
 
 
 def signal(count: int, start: float = 0.0) -> Array:
@@ -87,8 +78,3 @@ def test_spans_are_every_sample_after_their_begin_up_to_their_end() -> None:
     first, second = passed.between([(0.0, 0.25), (8.9985, 9.3)])
     assert np.array_equal(first['time'], samples[:250, 0])
     assert np.array_equal(second['force'], samples[8998:9300, 1])
-
-
-def test_other_things_are_dated_by_the_samples_about_them() -> None:
-    passed = RunSamples(lambda: blocks([signal(1000)]))
-    assert passed.simulated_time([1_500_000_000, 1_010_000_000]) == pytest.approx([0.5, 0.01])
