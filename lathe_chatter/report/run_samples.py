@@ -14,7 +14,6 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.samples.continuity import Continuity
 from lathe_chatter.samples.extremes import TIME, Extremes
 
-
 _AT_ONCE = 50_000
 """Samples that are looked at together: more would only take more memory."""
 
