@@ -166,7 +166,7 @@ class RecordedFile:
         Each comes with the earliest log time, ns, of what comes after.
         """
         self.topics()  # a chunk may name what an earlier one has
-        spans = sorted(spans_of(self.path, self.on_damage))
+        spans = sorted(self._spans())
         bounds = [*(span.first for span in spans), _LATEST]
         for span, bound in zip(spans, bounds[1:], strict=True):
             found = record_at(self.path, span.offset) if not span.end else self._loose(span)
@@ -183,17 +183,23 @@ class RecordedFile:
             records = stream.read(span.end - span.offset)
         return Chunk(span.offset, span.first, span.last, records, {}, proven=False)
 
+    def _spans(self) -> Iterator[Span]:
+        """Chunks and other messages; the index, which has a CRC, proves the times of a chunk."""
+        indexed = {place.offset: (place.first, place.last) for place in self.known.chunks}
+        for span in spans_of(self.path, self.on_damage):
+            times = span.first, span.last
+            if indexed.get(span.offset, times) != times:
+                reason = 'a chunk has not the times that the index has for it'
+                self.on_damage(Damage(self.path, span.offset, span.offset, reason))
+            yield span
+
     @property
     def in_time_order(self) -> bool:
         """Whether no chunk has a message that was received before one of an earlier chunk."""
         statistics = self.known.statistics
         spans = [(place.first, place.last) for place in self.known.chunks if place.last]
         if statistics is None or statistics.chunk_count != len(self.known.chunks) or not spans:
-            spans = [
-                (span.first, span.last)
-                for span in spans_of(self.path, self.on_damage)
-                if span.last
-            ]
+            spans = [(span.first, span.last) for span in self._spans() if span.last]
         return all(before[1] <= after[0] for before, after in pairwise(spans))
 
     def raw_messages(self, topics: tuple[str, ...] = ()) -> Iterator[Raw]:
