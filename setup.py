@@ -32,7 +32,7 @@ setup(
     # A run in other hands; each is asked for only where it is used.
     extras_require={
         'identify': ['pyuff', 'sdypy-EMA'],  # universal files, and first poles of a tap test
-        'export': ['pyarrow', 'pandas', 'xarray'],
+        'export': ['pyarrow', 'h5py', 'pandas', 'xarray'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),

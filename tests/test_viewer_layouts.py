@@ -34,6 +34,26 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return read_run(folder)
 
 
+@pytest.fixture(scope='module')
+def unrolled(run: Run) -> Run:
+    assert cli.main(['export', str(run.path), '--unrolled', '--end', '1.5']) == 0
+    return read_run(f'{run.path}-unrolled')
+
+
+UNROLLED = {
+    **{f'/lathe/samples/{column}': {'data'} for column in SHOWN['/lathe/samples']},
+    **{topic: places for topic, places in SHOWN.items() if topic != '/lathe/samples'},
+}
+
+
+@pytest.fixture(params=['', '_unrolled'])
+def shape(request: pytest.FixtureRequest) -> tuple[Run, str, dict[str, set[str]]]:
+    """A run, the ending of the name of its layouts, and what these show."""
+    ending = request.param
+    run: Run = request.getfixturevalue('unrolled' if ending else 'run')
+    return run, ending, UNROLLED if ending else SHOWN
+
+
 def value_at(run: Run, topic: str, place: str) -> Any:
     """What stands at `data` or `data[k]` in the first message of a topic."""
     message = next(iter(run.messages(topic))).message
@@ -57,14 +77,17 @@ def foxglove_paths(panel: dict[str, Any]) -> Iterator[str]:
         yield panel['xAxisPath']['value']
 
 
-def test_the_foxglove_layout_shows_what_a_run_has(run: Run) -> None:
-    layout = json.loads((LAYOUTS / 'foxglove.json').read_text())
+def test_the_foxglove_layout_shows_what_a_run_has(
+    shape: tuple[Run, str, dict[str, set[str]]],
+) -> None:
+    run, ending, expected = shape
+    layout = json.loads((LAYOUTS / f'foxglove{ending}.json').read_text())
     shown: dict[str, set[str]] = {}
     for panel in layout['configById'].values():
         for path in foxglove_paths(panel):
             topic, _, place = path.partition('.')
             shown.setdefault(topic, set()).add(shown_of(run, topic, place))
-    assert shown == {**SHOWN, '/chatter_monitor/state': {'data'}}
+    assert shown == {**expected, '/chatter_monitor/state': {'data'}}
 
     def leaves(node: Any) -> Iterator[str]:
         if isinstance(node, str):
@@ -75,8 +98,11 @@ def test_the_foxglove_layout_shows_what_a_run_has(run: Run) -> None:
     assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
 
 
-def test_the_plotjuggler_layout_shows_what_a_run_has(run: Run) -> None:
-    root = ET.parse(LAYOUTS / 'plotjuggler.xml').getroot()
+def test_the_plotjuggler_layout_shows_what_a_run_has(
+    shape: tuple[Run, str, dict[str, set[str]]],
+) -> None:
+    run, ending, expected = shape
+    root = ET.parse(LAYOUTS / f'plotjuggler{ending}.xml').getroot()
     shown: dict[str, set[str]] = {}
     for plot in root.iter('plot'):
         for curve in plot.iter('curve'):
@@ -84,5 +110,5 @@ def test_the_plotjuggler_layout_shows_what_a_run_has(run: Run) -> None:
             for key in ('curve_x', 'curve_y') if portrait else ('name',):
                 topic, _, place = str(curve.get(key)).rpartition('/')
                 shown.setdefault(topic, set()).add(shown_of(run, topic, place))
-    assert shown == SHOWN
+    assert shown == expected
     assert len([plot for plot in root.iter('plot') if plot.get('mode') == 'XYPlot']) == 2

@@ -1,4 +1,4 @@
-"""`lathe-chatter export`: the samples of a run as CSV, Parquet or unrolled MCAP."""
+"""`lathe-chatter export`: the samples of a run as CSV, Parquet, MAT, HDF5 or unrolled MCAP."""
 
 from __future__ import annotations
 
@@ -9,14 +9,22 @@ from pathlib import Path
 from lathe_chatter.cli.common_options import add_json, add_run, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import read_run
-from lathe_chatter.recording.export import discontinuity_sentences, to_csv, to_parquet, unroll
+from lathe_chatter.recording.export import (
+    discontinuity_sentences,
+    to_csv,
+    to_hdf5,
+    to_mat,
+    to_parquet,
+)
 from lathe_chatter.recording.sample_series import Selection
+from lathe_chatter.recording.unroll import unroll
 
 NAME = 'export'
-HELP = 'write the samples of a recorded run as CSV, Parquet, or one message per sample'
+HELP = 'write the samples of a recorded run as CSV, Parquet, MAT, HDF5, or a message per sample'
 EXAMPLE = 'lathe-chatter export runs/20260401-120000 --columns tool_displacement --start 3'
 
-_FORMATS = {'csv': to_csv, 'parquet': to_parquet, 'unrolled': unroll}
+_FILES = {'csv': to_csv, 'parquet': to_parquet, 'mat': to_mat, 'hdf5': to_hdf5}
+_SUFFIXES = {'hdf5': '.h5', 'unrolled': '-unrolled'}
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -24,7 +32,7 @@ def configure(parser: ArgumentParser) -> None:
     add_run(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument(
-        '--format', choices=('csv', 'parquet'), default='csv', help='default: %(default)s'
+        '--format', choices=tuple(_FILES), default='csv', help='default: %(default)s'
     )
     form.add_argument(
         '--unrolled',
@@ -48,7 +56,7 @@ def run(options: Namespace) -> int:
     """Export."""
     form = 'unrolled' if options.unrolled else options.format
     source: Path = options.run_path
-    suffix = '-unrolled' if options.unrolled else f'.{form}'
+    suffix = _SUFFIXES.get(form, f'.{form}')
     path = options.output or source.with_name(f'{source.stem}{suffix}')
     columns = None
     if options.columns is not None:
@@ -60,7 +68,8 @@ def run(options: Namespace) -> int:
     screen = Screen(json=options.json)
     total = recorded.count_of_samples(options.topic)
     with screen.progress('samples', total) as bar, writing(path):
-        done = _FORMATS[form](recorded, path, chosen, bar.advance)
+        write = _FILES.get(form, unroll)
+        done = write(recorded, path, chosen, bar.advance)
     for sentence in discontinuity_sentences(done):
         screen.say(f'note   {sentence}')
     screen.say(f'{done.samples} samples in {path}')

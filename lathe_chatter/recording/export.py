@@ -1,4 +1,4 @@
-"""A run as files for other programs: CSV, Parquet, and MCAP with one message per sample.
+"""A run as files for other programs: CSV, Parquet, MAT and HDF5.
 
 Nothing is held at once but some seconds of the run, and every number keeps its last bit.
 """
@@ -16,20 +16,15 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError, ParameterError
-from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.dataframes import optional
-from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run, RunReadError
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Selection
-from lathe_chatter.recording.writer import RunWriter
-from lathe_chatter.samples.codec import encode_number
 from lathe_chatter.samples.columns import UNITS
 from lathe_chatter.samples.continuity import Continuity, time_text
 
-NUMBER_TYPE = 'std_msgs/msg/Float64'
-_COMMIT_AFTER = 100_000
-"""Messages after which an unrolled file is put on disk."""
+_MOST_IN_MAT = 2**28 - 1
+"""Samples: a variable of a MAT file has less than 2 GB."""
 
 Progress = Callable[[int], None]
 """Told how many samples have been written since it was told last."""
@@ -60,16 +55,18 @@ class Exported(NamedTuple):
 def to_csv(
     run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
 ) -> Exported:
-    """Write samples as CSV, with a head of names; every number is read back to its last bit.
+    """Write samples as CSV; every number is read back to its last bit.
+
+    The head has the names of the columns, each with its unit, as `cutting_force [N]`.
 
     Raises:
         ExportExistsError: If the file exists.
         RunReadError: If the run cannot be read, or has no such samples.
         OSError: If the file cannot be written.
     """
-    parts = _Parts(run, chosen or Selection(), progress)
+    parts = ExportedParts(run, chosen or Selection(), progress)
     with _whole(path), path.open('w', encoding='ascii', newline='') as stream:
-        stream.write(','.join(parts.names) + '\n')
+        stream.write(','.join(f'{name} [{UNITS.get(name, "")}]' for name in parts.names) + '\n')
         for part in parts:
             stream.writelines(','.join(map(repr, row)) + '\n' for row in part.tolist())
     return Exported(path, parts.count, parts.continuity)
@@ -88,7 +85,7 @@ def to_parquet(
     """
     arrow = optional('pyarrow', 'Parquet')
     parquet = optional('pyarrow.parquet', 'Parquet')
-    parts = _Parts(run, chosen or Selection(), progress)
+    parts = ExportedParts(run, chosen or Selection(), progress)
     schema = arrow.schema(
         [
             arrow.field(n, arrow.float64(), nullable=False, metadata={'unit': UNITS.get(n, '')})
@@ -106,47 +103,87 @@ def to_parquet(
     return Exported(path, parts.count, parts.continuity)
 
 
-def unroll(
+def to_mat(
     run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
 ) -> Exported:
-    """Write a run with one std_msgs/Float64 for each sample of each signal.
+    """Write samples as a MAT file (version 5) for MATLAB, Octave and SciPy.
 
-    The topics are `<samples>/<column>`, and the messages are dated by simulated time since the
-    epoch; where simulated time goes back, it is counted on from there.
+    Each signal is a column of doubles; beside them `units`, a structure, `gaps` and `restarts`
+    (m x 2, s) and `run`.
 
     Raises:
-        RunExistsError: If the folder exists.
-        RunReadError: If the run cannot be read, or has no such samples.
-        OSError: If it cannot be written.
+        ExportExistsError: If the file exists.
+        RunReadError: If the run cannot be read, has no such samples, or too many for the format.
+        OSError: If the file cannot be written.
     """
-    chosen = chosen or Selection()
-    parts = _Parts(run, chosen, progress)
-    topic = chosen.topic or run.samples_topic()
-    written, base, last = 0, 0, 0
-    with atomic_folder(path), RunWriter(path) as writer:
-        topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != TIME}
-        for name in topics.values():
-            writer.add_topic(topic_of_type(name, NUMBER_TYPE))
-        time = parts.names.index(TIME)
+    from scipy.io import savemat  # half a second to load, and only wanted here
+
+    parts = ExportedParts(run, chosen or Selection(), progress)
+    with _whole(path):
+        kept = []
         for part in parts:
-            for number, row in enumerate(part.tolist(), parts.count - len(part) + 1):
-                stamp = base + round(row[time] * 1e9)
-                if stamp <= last and number > 1:
-                    base += last
-                    stamp += last
-                last = stamp
-                for k, name in topics.items():
-                    data = encode_number(row[k])
-                    writer.write(name, data, log_time=stamp, publish_time=stamp, sequence=number)
-                written += len(topics)
-            if written > _COMMIT_AFTER:
-                writer.commit_soon()
-                written = 0
+            kept.append(part)
+            if parts.count > _MOST_IN_MAT:
+                raise RunReadError(
+                    f'{run.path} has more samples than a MAT file can hold, {_MOST_IN_MAT}: '
+                    'choose a range of time, or HDF5.'
+                )
+        signals = {n: np.concatenate([p[:, k] for p in kept]) for k, n in enumerate(parts.names)}
+        facts = {
+            'units': {name: UNITS.get(name, '') for name in parts.names},
+            'gaps': np.reshape(parts.continuity.gap_places, (-1, 2)),
+            'restarts': np.reshape(parts.continuity.restart_places, (-1, 2)),
+            'run': str(run.path),
+        }
+        savemat(
+            str(path),
+            {**signals, **facts},
+            appendmat=False,
+            oned_as='column',
+            long_field_names=True,
+        )
     return Exported(path, parts.count, parts.continuity)
 
 
-class _Parts:
+def to_hdf5(
+    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
+) -> Exported:
+    """Write samples as HDF5, which MATLAB (`h5read`), h5py and many others read.
+
+    Each signal is a dataset with its `units`; beside them `gaps` and `restarts` (m x 2, s).
+
+    Raises:
+        MissingPackageError: If h5py is not installed.
+        ExportExistsError: If the file exists.
+        RunReadError: If the run cannot be read, or has no such samples.
+        OSError: If the file cannot be written.
+    """
+    h5py = optional('h5py', 'HDF5')
+    parts = ExportedParts(run, chosen or Selection(), progress)
+    with _whole(path), h5py.File(path, 'w') as file:
+        kind = {'dtype': 'f8', 'maxshape': (None,), 'chunks': (1 << 16,)}
+        signals = [file.create_dataset(name, (0,), **kind) for name in parts.names]
+        for name, signal in zip(parts.names, signals, strict=True):
+            signal.attrs['units'] = UNITS.get(name, '')
+        for part in parts:
+            for signal, column in zip(signals, part.T, strict=True):
+                signal.resize((parts.count,))
+                signal[-len(column) :] = column
+        for name in ('gap', 'restart'):
+            places = getattr(parts.continuity, f'{name}_places')
+            file[f'{name}s'] = np.reshape(np.array(places, float), (-1, 2))
+            file[f'{name}s'].attrs['units'] = UNITS[TIME]
+        file.attrs['run'] = str(run.path)
+    return Exported(path, parts.count, parts.continuity)
+
+
+class ExportedParts:
     """Chosen samples, some seconds at a time.
+
+    Args:
+        run: Which has them.
+        chosen: Which are wanted.
+        progress: Told how many have been looked at.
 
     Attributes:
         names: Of the columns, in the order of the record.
@@ -155,6 +192,12 @@ class _Parts:
     """
 
     def __init__(self, run: Run, chosen: Selection, progress: Progress | None) -> None:
+        """Look whether there are such columns.
+
+        Raises:
+            ParameterError: If the range of time is none.
+            RunReadError: If the run cannot be read, or has no such samples or columns.
+        """
         if not chosen.start <= chosen.end:
             raise ParameterError('start', chosen.start, 's', f'at most the end, {chosen.end:g} s')
         self._run, self._chosen, self._progress = run, chosen, progress

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
-from support.recorded import NUMBER, STORE
+from scipy.io import loadmat
+from support.recorded import BOOL, NUMBER, STORE
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model.parameters import parameters_of
-from lathe_chatter.recording import LatheRun, read_run
+from lathe_chatter.recording import LatheRun, read_run, verify
 from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.columns import UNITS
 
 BLOCKS, ROWS, MISSING = 60, 20, 30
 
@@ -48,7 +50,7 @@ def test_csv_is_read_back_to_the_last_bit(
     assert 'samples are missing between 0.060000 s and 0.062100 s' in told.err
     with Path(figures['path']).open() as stream:
         names, *rows = csv.reader(stream)
-    assert tuple(names) == SAMPLE_COLUMNS
+    assert tuple(names) == tuple(f'{name} [{UNITS[name]}]' for name in SAMPLE_COLUMNS)
     assert np.array(rows, float).tobytes() == samples.tobytes()
 
 
@@ -57,10 +59,10 @@ def test_columns_and_a_range_of_time(folder: Path, samples: Array, tmp_path: Pat
     words = ['--columns', 'cutting_force,chip_thickness', '--start', '0.01', '--end', '0.02']
     assert main(['export', str(folder), '--output', str(out), *words]) == 0
     found = np.genfromtxt(out, delimiter=',', names=True)
-    assert found.dtype.names == ('time', 'chip_thickness', 'cutting_force')
+    assert found.dtype.names == ('time_s', 'chip_thickness_m', 'cutting_force_N')
     inside = samples[(samples[:, 0] >= 0.01) & (samples[:, 0] <= 0.02)]
-    assert found['time'].tolist() == inside[:, 0].tolist()
-    assert found['cutting_force'].tolist() == inside[:, 7].tolist()
+    assert found['time_s'].tolist() == inside[:, 0].tolist()
+    assert found['cutting_force_N'].tolist() == inside[:, 7].tolist()
 
 
 def test_unrolled_each_sample_is_a_message_at_its_simulated_time(
@@ -70,16 +72,17 @@ def test_unrolled_each_sample_is_a_message_at_its_simulated_time(
     out = tmp_path / 'run-unrolled'
     stamps = [round(time * 1e9) for time in samples[:, 0]]
     with Reader(out) as reader:
-        assert {each.msgtype for each in reader.connections} == {NUMBER}
-        found = {each.topic: [] for each in reader.connections}
-        for each, stamp, data in reader.messages():
+        signals = [each for each in reader.connections if each.topic.startswith('/lathe/')]
+        assert {each.msgtype for each in signals} == {NUMBER}
+        found = {each.topic: [] for each in signals}
+        for each, stamp, data in reader.messages(signals):
             found[each.topic].append((stamp, STORE.deserialize_cdr(data, NUMBER).data))
     for k, name in enumerate(SAMPLE_COLUMNS[1:], 1):
         pairs = list(zip(stamps, samples[:, k].tolist(), strict=True))
         assert found[f'/lathe/samples/{name}'] == pairs
     with (out / 'run-unrolled_0.mcap').open('rb') as stream:
         count = sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
-    assert count == 7 * len(samples)
+    assert count == 7 * len(samples) + 1  # and the parameters
 
 
 def test_unrolled_stamps_go_on_where_simulated_time_goes_back(tmp_path: Path) -> None:
@@ -87,7 +90,7 @@ def test_unrolled_stamps_go_on_where_simulated_time_goes_back(tmp_path: Path) ->
         run.write(VirtualLathe().advance(3))
         run.write(VirtualLathe().advance(3))
     assert main(['export', str(tmp_path / 'run'), '--unrolled', '--columns', 'cutting_force']) == 0
-    raw = read_run(tmp_path / 'run-unrolled').raw_messages()
+    raw = read_run(tmp_path / 'run-unrolled').raw_messages('/lathe/samples/cutting_force')
     assert [each.log_time for each in raw] == [k * 100_000 for k in (1, 2, 3, 4, 5, 6)]
 
 
@@ -107,7 +110,9 @@ def test_a_column_that_is_not_there_is_one_sentence(
     assert 'have no column speed.' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('form', [(), ('--unrolled',)], ids=['csv', 'unrolled'])
+@pytest.mark.parametrize(
+    'form', [(), ('--format', 'mat'), ('--format', 'hdf5'), ('--unrolled',)], ids=str
+)
 def test_an_export_that_fails_leaves_nothing_in_the_way_of_the_next(
     folder: Path, form: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -157,6 +162,42 @@ def test_parquet_holds_every_bit_units_and_gaps(
     assert table.schema.field('cutting_force').metadata == {b'unit': b'N'}
     told = parquet.read_metadata(tmp_path / 'run.parquet').metadata
     assert json.loads(told[b'gaps']) == [[0.06, 0.0621]]
+
+
+def test_mat_holds_every_bit_units_and_gaps(folder: Path, samples: Array, tmp_path: Path) -> None:
+    assert main(['export', str(folder), '--format', 'mat']) == 0
+    found = loadmat(tmp_path / 'run.mat', simplify_cells=True)
+    for k, name in enumerate(SAMPLE_COLUMNS):
+        assert found[name].tobytes() == np.ascontiguousarray(samples[:, k]).tobytes()
+    assert found['units'] == dict(UNITS)
+    assert np.reshape(found['gaps'], (-1, 2)).tolist() == [[0.06, 0.0621]]
+    assert found['restarts'].size == 0
+    assert loadmat(tmp_path / 'run.mat')['time'].shape == (len(samples), 1)
+
+
+def test_hdf5_holds_every_bit_units_and_gaps(folder: Path, samples: Array, tmp_path: Path) -> None:
+    h5py = pytest.importorskip('h5py')
+    assert main(['export', str(folder), '--format', 'hdf5']) == 0
+    with h5py.File(tmp_path / 'run.h5') as found:
+        for k, name in enumerate(SAMPLE_COLUMNS):
+            assert found[name][:].tobytes() == np.ascontiguousarray(samples[:, k]).tobytes()
+            assert found[name].attrs['units'] == UNITS[name]
+        assert found['gaps'][:].tolist() == [[0.06, 0.0621]]
+        assert found['restarts'].shape == (0, 2)
+
+
+def test_unrolled_other_topics_stand_where_they_came(tmp_path: Path) -> None:
+    lathe = VirtualLathe()
+    with LatheRun(tmp_path / 'run', parameters_of(lathe), simulated=True) as run:
+        for k in range(20):
+            run.write(lathe.advance(20))
+            if k == 9:
+                run.publish('/chatter_monitor/chatter', BOOL, data=True)
+    assert main(['export', str(tmp_path / 'run'), '--unrolled']) == 0
+    (flag,) = read_run(tmp_path / 'run-unrolled').messages('/chatter_monitor/chatter')
+    assert flag.message.data
+    assert flag.log_time == 20_000_000  # with the block that ends at 0.02 s
+    assert verify(tmp_path / 'run-unrolled').complete
 
 
 def test_pandas_and_xarray_have_the_same_numbers(folder: Path, samples: Array) -> None:

@@ -1,0 +1,112 @@
+"""A run with one message for each sample of each signal, for viewers that unroll no blocks."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+
+from lathe_chatter.arrays import Integers
+from lathe_chatter.recording.atomic_output import atomic_folder
+from lathe_chatter.recording.export import Exported, ExportedParts, Progress
+from lathe_chatter.recording.metadata import Topic
+from lathe_chatter.recording.ros_messages import topic_of_type
+from lathe_chatter.recording.run import Run
+from lathe_chatter.recording.run_file import Raw, offers_of
+from lathe_chatter.recording.run_timeline import Timeline, read_timeline
+from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.recording.sample_series import Selection
+from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.samples.codec import encode_number
+
+NUMBER_TYPE = 'std_msgs/msg/Float64'
+_COMMIT_AFTER = 100_000
+"""Messages after which the file is put on disk."""
+
+
+def unroll(
+    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
+) -> Exported:
+    """Write a run with one std_msgs/Float64 for each sample of each signal.
+
+    The topics are `<samples>/<column>`, and the messages are dated by simulated time since the
+    epoch; where simulated time goes back, it is counted on from there. The messages of other
+    topics, as those of the monitor, stand among them at the simulated time at which they came,
+    as far as ROS describes their types.
+
+    Raises:
+        RunExistsError: If the folder exists.
+        RunReadError: If the run cannot be read, or has no such samples.
+        OSError: If it cannot be written.
+    """
+    chosen = chosen or Selection()
+    topic = chosen.topic or run.samples_topic()
+    parts = ExportedParts(run, chosen, progress)
+    others = _others(run, topic, chosen)
+    written, base, last = 0, 0, 0
+    with atomic_folder(path), RunWriter(path) as writer:
+        topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != TIME}
+        for name in topics.values():
+            writer.add_topic(topic_of_type(name, NUMBER_TYPE))
+        time = parts.names.index(TIME)
+        for part in parts:
+            for number, row in enumerate(part.tolist(), parts.count - len(part) + 1):
+                stamp = base + round(row[time] * 1e9)
+                if stamp <= last and number > 1:
+                    base += last
+                    stamp += last
+                last = stamp
+                for k, name in topics.items():
+                    data = encode_number(row[k])
+                    writer.write(name, data, log_time=stamp, publish_time=stamp, sequence=number)
+                written += len(topics)
+            while others and others[0][0] <= last:
+                _write(writer, *others.popleft())
+            if written > _COMMIT_AFTER:
+                writer.commit_soon()
+                written = 0
+        while others:
+            _write(writer, *others.popleft())
+    return Exported(path, parts.count, parts.continuity)
+
+
+def _write(writer: RunWriter, stamp: int, raw: Raw) -> None:
+    """Write a message of another topic, dated in ns."""
+    kind = Topic(
+        raw.topic,
+        raw.type,
+        bytes(raw.schema.data).decode(),
+        raw.channel.metadata.get('topic_type_hash', ''),
+        tuple(offers_of(raw.channel)),
+    )
+    writer.add_topic(kind)
+    writer.write(raw.topic, raw.data, log_time=stamp, publish_time=stamp, sequence=raw.sequence)
+
+
+def _others(run: Run, samples: str, chosen: Selection) -> deque[tuple[int, Raw]]:
+    """The messages of other topics that are in the chosen range, each with its new date, ns."""
+    timeline, found = read_timeline(run, samples, lambda topic: topic != samples)
+    if not len(timeline.last):
+        return deque()
+    stamps = _stamps(timeline)
+    kept: list[tuple[int, Raw]] = []
+    for each in found:
+        schema = each.raw.schema
+        if each.raw.channel.message_encoding != 'cdr' or schema is None:
+            continue
+        if schema.encoding != 'ros2msg':
+            continue
+        received, _ = timeline.steady(each)
+        block = min(int(np.searchsorted(timeline.received, received)), len(stamps) - 1)
+        if chosen.start <= timeline.last[block] and timeline.first[block] <= chosen.end:
+            kept.append((int(np.interp(received, timeline.received, stamps)), each.raw))
+    return deque(sorted(kept, key=lambda pair: pair[0]))
+
+
+def _stamps(timeline: Timeline) -> Integers:
+    """The dates of the last samples of blocks, ns, counted on where simulated time goes back."""
+    stamps = np.rint(timeline.last * 1e9).astype(np.int64)
+    for block in timeline.restarts.tolist():
+        stamps[block:] += stamps[block - 1]
+    return stamps
