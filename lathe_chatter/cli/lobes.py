@@ -23,9 +23,12 @@ from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.model.parameters import described_by
 from lathe_chatter.model.quantities import Quantity, limits_of
+from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.plot_style import files_of_picture
+from lathe_chatter.report.probability_chart import SURE
 from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_lobes
 from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map
+from lathe_chatter.stability.probability import StabilityProbability, stability_probability
 
 NAME = 'lobes'
 HELP = 'draw the stability chart: both limits, the seating line and the safe region'
@@ -39,6 +42,9 @@ _HEADROOM = 2.6
 _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
+_PROBABLE_SPEEDS = 200
+_WORTH_A_WORD = 0.05
+"""Share of the variance below which a figure is not named."""
 _PARTS = 28
 _SHALLOWEST = 1000.0
 """Part of the top at which a map begins: at a depth of 0 there is no cut."""
@@ -57,6 +63,12 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         '--depth-limit', type=float, metavar='M', help='top of the chart, m (default: fits)'
     )
+    parser.add_argument(
+        '--uncertain', metavar='LIST',
+        help='relative standard errors of the machine, as frequency=2%%,damping=20%%,stiffness=5%%,'
+        'C=15%%: the chart shows the probability of being stable (default: those of the machine '
+        'file, if it has any)',
+    )  # fmt: skip
     parser.add_argument('--map', action='store_true', help='colour the chart with the growth rate')
     parser.add_argument(
         '--output', type=Path, default=Path('lobes.png'), metavar='FILE',
@@ -93,16 +105,21 @@ def run(options: Namespace) -> int:
     growth = None
     if options.map or config.cut.speed_variation_amplitude > 0.0:
         growth = _map(config, low, high, top, screen)
+    probability = None
+    if growth is None:
+        probability = _probability(options, config, low, high, screen)
     with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
-        draw_lobes(config.cut, limits, growth, top, options.output)
+        draw_lobes(config.cut, limits, growth, top, options.output, probability=probability)
     if options.csv is not None:
         with writing(options.csv):
             _write_csv(options.csv, config, limits)
     _show(config, limits, screen)
+    if probability is not None:
+        _show_probability(config, probability, screen)
     for file in files:
         screen.name_file('picture', file)
-    screen.json(_figures(config, limits, growth))
+    screen.json(_figures(config, limits, growth, probability))
     return 0
 
 
@@ -148,6 +165,43 @@ def _map(config: LatheConfig, low: float, high: float, top: float, screen: Scree
     )
 
 
+def _probability(
+    options: Namespace, config: LatheConfig, low: float, high: float, screen: Screen
+) -> StabilityProbability | None:
+    """Of a machine that is known with errors, None where nothing is said of any."""
+    known = None
+    if options.uncertain is not None:
+        known = uncertainty_from(options.uncertain, config.machine)
+    elif described := described_by(given_parameters(options)):
+        known = described.uncertainty
+    if not known:
+        return None
+    with screen.working('Drawing machines as the truth may be ...'):
+        return stability_probability(
+            config.machine,
+            known,
+            config.cut,
+            chart_speeds(low, high, _PROBABLE_SPEEDS),
+            tool_leaves_cut=config.setup.tool_leaves_cut,
+        )
+
+
+def _show_probability(
+    config: LatheConfig, probability: StabilityProbability, screen: Screen
+) -> None:
+    """What is safe at the speed of the cut, and what makes it uncertain."""
+    speed = config.cut.spindle_speed_rpm
+    sure = np.interp(speed, probability.spindle_speed_rpm, probability.safe_depth(SURE))
+    screen.say(f'stable with {SURE:.0%} at {speed:g} rev/min: up to {sure * 1e3:.4f} mm')
+    shares = [
+        f'{name} {share:.0%}'
+        for name, share in probability.worth_repeating(speed)
+        if share >= _WORTH_A_WORD
+    ]
+    if shares:
+        screen.say(f'uncertain there by: {", ".join(shares[:4])}')
+
+
 def _columns(config: LatheConfig, limits: SafeLimit) -> dict[str, Array]:
     """The chart as columns; without what the machine has not."""
     columns = {
@@ -169,12 +223,28 @@ def _write_csv(path: Path, config: LatheConfig, limits: SafeLimit) -> None:
         writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
-def _figures(config: LatheConfig, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
+def _figures(
+    config: LatheConfig,
+    limits: SafeLimit,
+    growth: GrowthMap | None,
+    probability: StabilityProbability | None,
+) -> dict[str, Any]:
     """The chart as figures; an infinite limit is null in JSON."""
     return {
         'parameters': config.parameters(),
         **_columns(config, limits),
         **({} if growth is None else {'map': growth}),
+        **(
+            {}
+            if probability is None
+            else {
+                'safe_with_95_percent': {
+                    'spindle_speed_rpm': probability.spindle_speed_rpm,
+                    'depth_of_cut': probability.safe_depth(SURE),
+                },
+                'worth_repeating': dict(probability.worth_repeating(config.cut.spindle_speed_rpm)),
+            }
+        ),
     }
 
 

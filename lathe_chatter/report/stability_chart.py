@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.plot_style import LINE, OPEN, SAFE, SEATED, axes_or_new, grid, new_figure, save
+from lathe_chatter.report.probability_chart import draw_probability
 from lathe_chatter.stability import GrowthMap, SafeLimit, safe_limit
+from lathe_chatter.stability.probability import StabilityProbability
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,17 +76,29 @@ def _about_peaks(limits: SafeLimit) -> Array:
     return found
 
 
-def draw_lobes(
-    cut: Cut, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float, path: Path
+def draw_lobes(  # noqa: PLR0913 -- what a chart may show
+    cut: Cut,
+    limits: SafeLimit,
+    growth: GrowthMap | None,
+    depth_limit: float,
+    path: Path,
+    *,
+    probability: StabilityProbability | None = None,
 ) -> None:
     """Draw a chart into a file, see `draw_chart` and `save`."""
     figure = new_figure(11.0, 6.0)
-    draw_chart(figure.subplots(), cut, limits, growth, depth_limit)
+    draw_chart(figure.subplots(), cut, limits, growth, depth_limit, probability=probability)
     save(figure, path)
 
 
-def draw_chart(
-    axes: Axes, cut: Cut, limits: SafeLimit, growth: GrowthMap | None, depth_limit: float
+def draw_chart(  # noqa: PLR0913 -- what a chart may show
+    axes: Axes,
+    cut: Cut,
+    limits: SafeLimit,
+    growth: GrowthMap | None,
+    depth_limit: float,
+    *,
+    probability: StabilityProbability | None = None,
 ) -> None:
     """Draw a chart with its point of operation.
 
@@ -94,11 +108,15 @@ def draw_chart(
         limits: Over rising speeds.
         growth: To colour the chart with, or None.
         depth_limit: Top of the chart, m.
+        probability: To colour it with, of a machine that is known with errors.
     """
     varied = cut.speed_variation_amplitude > 0.0
     if growth is not None:
         _draw_growth(axes, growth, zero=varied)
-    draw_limits(axes, limits, cut.bearing_contact, depth_limit, shade=growth is None)
+    plain = growth is None and probability is None
+    draw_limits(axes, limits, cut.bearing_contact, depth_limit, shade=plain)
+    if probability is not None:
+        draw_probability(axes, probability, depth_limit)
     if cut.depth_of_cut <= depth_limit:
         axes.plot(
             cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
