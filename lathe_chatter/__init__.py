@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lathe_chatter.lathe.state import LatheState
     from lathe_chatter.lathe.sweep import LatheSweep
     from lathe_chatter.model import BearingContact, Cut, Machine, Mode
+    from lathe_chatter.model.machine_file import MachineDescription, load_machine
     from lathe_chatter.recording import Run, RunWriter, Samples, read_run
     from lathe_chatter.recording.recover import recover
     from lathe_chatter.recording.resimulate import resimulate
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
         rightmost_roots,
         safe_limit,
     )
+    from lathe_chatter.stability.probability import stability_probability
+    from lathe_chatter.tap_test import fit_modes, read_frequency_responses
 
 __all__ = [
     'BearingContact',
@@ -51,6 +54,7 @@ __all__ = [
     'LatheState',
     'LatheSweep',
     'Machine',
+    'MachineDescription',
     'Mode',
     'ParameterError',
     'Run',
@@ -61,11 +65,14 @@ __all__ = [
     '__version__',
     'critical_depth',
     'critical_depths',
+    'fit_modes',
     'floquet',
     'growth_map',
+    'load_machine',
     'load_scenario',
     'lobe_boundary',
     'plot_lobes',
+    'read_frequency_responses',
     'read_run',
     'recommend_speeds',
     'recover',
@@ -75,6 +82,7 @@ __all__ = [
     'safe_limit',
     'simulate',
     'smallest_lasting_knock',
+    'stability_probability',
     'verify',
 ]
 
@@ -90,14 +98,17 @@ _MODULES = {
     'lathe.state': ('LatheState',),
     'lathe.sweep': ('LatheSweep',),
     'model': ('BearingContact', 'Cut', 'Machine', 'Mode'),
+    'model.machine_file': ('MachineDescription', 'load_machine'),
     'recording': ('Run', 'RunWriter', 'Samples', 'read_run', 'recover', 'resimulate', 'verify'),
     'report.stability_chart': ('plot_lobes',),
     'scenario': ('Scenario', 'load_scenario'),
     'scenario.simulation': ('simulate',),
+    'stability.probability': ('stability_probability',),
     'stability': (
         'critical_depth', 'critical_depths', 'floquet', 'growth_map', 'lobe_boundary',
         'recommend_speeds', 'rightmost_root', 'rightmost_roots', 'safe_limit',
     ),
+    'tap_test': ('fit_modes', 'read_frequency_responses'),
 }
 # fmt: on
 _HOME = {name: module for module, names in _MODULES.items() for name in names}

@@ -61,8 +61,7 @@ def test_what_is_worth_measuring_again_is_what_makes_the_limit_uncertain() -> No
 def test_the_same_seed_draws_the_same_and_a_probability_is_one() -> None:
     known = uncertainty_from('C=10%', Machine())
     one, two = (
-        stability_probability(Machine(), known, CUT, SPEEDS, machines=50, seed=9)
-        for _ in range(2)
+        stability_probability(Machine(), known, CUT, SPEEDS, machines=50, seed=9) for _ in range(2)
     )
     assert one.limits.tobytes() == two.limits.tobytes()
     with pytest.raises(ParameterError, match='probability'):
