@@ -65,9 +65,9 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         '--uncertain', metavar='LIST',
-        help='relative standard errors of the machine, as frequency=2%%,damping=20%%,stiffness=5%%,'
-        'C=15%%: the chart shows the probability of being stable (default: those of the machine '
-        'file, if it has any)',
+        help='relative standard errors of the machine, as frequency=2%%,damping=20%%,'
+        'stiffness=5%%,C=15%%: the chart shows the probability of being stable (default: '
+        'those of the machine file, if it has any)',
     )  # fmt: skip
     parser.add_argument('--map', action='store_true', help='colour the chart with the growth rate')
     parser.add_argument(

@@ -189,7 +189,7 @@ class Cuts:
         Raises:
             ParameterError: If a machine is none, or a speed or depth not allowed.
         """
-        given = _machines(machines)
+        given = machine_array(machines)
         speeds = checked('spindle_speed_rpm', spindle_speed_rpm)
         depths = np.ones(()) if depth_of_cut is None else checked('depth_of_cut', depth_of_cut)
         different: dict[int, Machine] = {id(machine): machine for machine in given.ravel()}
@@ -213,7 +213,7 @@ class Cuts:
         )  # fmt: skip
 
 
-def _machines(machines: Machines) -> NDArray[np.object_]:
+def machine_array(machines: Machines) -> NDArray[np.object_]:
     """One or several machines as an array.
 
     Raises:

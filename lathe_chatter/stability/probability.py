@@ -17,7 +17,7 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import Quantity, count_of
 from lathe_chatter.model.uncertainty import Uncertainty
 from lathe_chatter.stability.characteristic import checked
-from lathe_chatter.stability.safe_limit import safe_limits
+from lathe_chatter.stability.safe_limit import safe_limit
 
 _SHARE = Quantity('probability', low=0.0, high=1.0)
 
@@ -88,7 +88,8 @@ def stability_probability(  # noqa: PLR0913 -- what is cut, how sure that is, an
     """
     speeds = np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
     drawn, deviations = uncertainty.draw(machine, count_of('machines', machines, least=1), seed)
-    limits = safe_limits(drawn, cut, speeds, tool_leaves_cut=tool_leaves_cut)
+    each = np.array(drawn, object)[:, None]
+    limits = safe_limit(each, cut, speeds, tool_leaves_cut=tool_leaves_cut).depth_of_cut
     return StabilityProbability(
         speeds, np.sort(limits, axis=0), uncertainty.names, _shares(deviations, limits)
     )

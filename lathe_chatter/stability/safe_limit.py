@@ -26,7 +26,12 @@ from numpy.typing import ArrayLike
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.stability.characteristic import ProcessDamping, checked
+from lathe_chatter.stability.characteristic import (
+    Machines,
+    ProcessDamping,
+    checked,
+    machine_array,
+)
 from lathe_chatter.stability.critical_depth import critical_depth, critical_depths
 
 _CLEARANCE = Quantity('bearing clearance gamma', 'm')
@@ -110,7 +115,7 @@ def _always_seated(cut: Cut) -> bool:
 
 
 def safe_limit(
-    machine: Machine,
+    machine: Machines,
     cut: Cut,
     spindle_speed_rpm: ArrayLike | None = None,
     *,
@@ -119,7 +124,8 @@ def safe_limit(
     """The edge of the safe region at the clearance and feed speed of a cut.
 
     Args:
-        machine: Tool, workpiece, bearing and material.
+        machine: Tool, workpiece, bearing and material; or machines, of a shape that broadcasts
+            with the speeds.
         cut: Clearance, contact, feed speed; its own speed where none are given.
         spindle_speed_rpm: Speeds of any shape, rev/min. The feed per revolution falls with them.
         tool_leaves_cut: Whether the force has a mean; the paper's linear force has none, and
@@ -136,17 +142,19 @@ def safe_limit(
     process = ProcessDamping.of(cut)
     floating = critical_depths(machine, speeds, seated=False, process=process)
     seated = critical_depths(machine, speeds, seated=True, process=process)
-    line = np.full(speeds.shape, math.inf)
+    line = np.full(floating.shape, math.inf)
     if _always_seated(cut):
-        line = np.zeros(speeds.shape)
+        line = np.zeros(floating.shape)
     elif _seats(cut) and tool_leaves_cut:
         # The line is inverse to the feed, which is inverse to the speed.
-        at_one = seating_depth(machine, cut.bearing_clearance, 60.0 * cut.feed_speed)
-        line = at_one * speeds
+        feed = 60.0 * cut.feed_speed
+        each = machine_array(machine)
+        at_one = [seating_depth(one, cut.bearing_clearance, feed) for one in each.ravel()]
+        line = np.broadcast_to(np.reshape(at_one, each.shape) * speeds, floating.shape)
     depth = np.where(floating <= line, floating, np.maximum(line, seated))
     if _on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
-        depth = np.zeros(speeds.shape)
-    return SafeLimit(speeds, depth, floating, seated, line)
+        depth = np.zeros(floating.shape)
+    return SafeLimit(np.broadcast_to(speeds, floating.shape), depth, floating, seated, line)
 
 
 def contact_at(machine: Machine, cut: Cut, *, tool_leaves_cut: bool = True) -> ContactAt:
