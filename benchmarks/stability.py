@@ -21,7 +21,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -39,10 +39,11 @@ from lathe_chatter.cli.bench import (
     this_machine,
     varied_cuts,
 )
+from lathe_chatter.model import Machine, Mode
 
 sys.path.append(str(Path(__file__).parents[1] / 'tests'))
 
-from support.machines import random_machine
+from support.machines import random_machine, random_structure
 from support.reference import collocation
 
 
@@ -117,6 +118,93 @@ def advice(machines: int) -> list[Figure]:
     ]
 
 
+def structures(repeats: int) -> list[Figure]:
+    """Machines with several modes, many machines at once, and textbook limits."""
+    rng = np.random.default_rng(0)
+    figures = []
+    for modes in ((1, 1), (2, 2), (4, 4), (8, 8)):
+        machines = np.array([random_structure(rng, *modes) for _ in range(1000)], object)
+        for seated in (False, True):
+            spent = _median(
+                lambda machines=machines, seated=seated: stability.rightmost_roots(
+                    machines, 3000.0, 7e-4, seated=seated
+                ),
+                repeats,
+            )
+            regime = 'on the bearing' if seated else 'open'
+            name = f'rightmost root of each of 1000 machines with {modes[0]}+{modes[1]} modes'
+            figures.append(Figure(f'{name}, {regime}', spent, 'ms each'))
+    machines = np.array([random_machine(rng) for _ in range(1000)], object)[:, None]
+    speeds = np.linspace(1000.0, 12000.0, 200)
+    spent = _median(
+        lambda: stability.critical_depths(machines, speeds, seated=False), min(repeats, 3)
+    )
+    figures.append(Figure('critical depths of 1000 machines at 200 speeds', spent, 's'))
+    machine = random_structure(rng, 4, 4)
+    for name, process in (('', stability.ProcessDamping()), (', process damping', FLANK)):
+        spent = _median(
+            lambda process=process: stability.rightmost_roots(
+                machine, SPEEDS, DEPTHS[:, None], seated=False, process=process
+            ),
+            repeats,
+        )
+        figures.append(Figure(f'growth map 111 x 38 of 4+4 modes{name}', spent, 's'))
+    return [*figures, *_textbook()]
+
+
+FLANK = stability.ProcessDamping(1e3, 0.05)
+
+
+def _textbook() -> list[Figure]:
+    """Errors against 2 k zeta (1 + zeta) / K, for one mode and for one among rigid others."""
+    mode, coefficient = Mode(2.0, 1885.0, 0.03), 1.5e9
+    machine = Machine(
+        mode, Mode(1e6, 1e6, 0.05), bearing_stiffness=1.0, cutting_coefficient=coefficient
+    )
+    zeta = mode.damping_ratio
+    lowest = 2.0 * mode.stiffness * zeta * (1.0 + zeta) / coefficient
+    ratio = np.sqrt(1.0 + 2.0 * zeta)
+    angle = np.arctan2(-2.0 * zeta * ratio, 1.0 - ratio**2)
+    phases = 2.0 * np.pi * np.arange(30) + 3.0 * np.pi + 2.0 * angle
+    speeds = 60.0 * mode.natural_frequency * ratio / phases
+    found = stability.critical_depths(machine, speeds, seated=False)
+    error = float(np.abs(found / lowest - 1.0).max())
+    return [Figure('relative error of the textbook limit of one mode, 30 lobes', error, '')]
+
+
+def slow_variation() -> list[Figure]:
+    """A slow spindle that swings slowly, also with a mode a hundred times stiffer."""
+    figures = []
+    for name, frequency in (('', 775.0), (', one mode a hundred times stiffer', 7750.0)):
+        script = (
+            'import resource, time; from lathe_chatter.model import *; '
+            'from lathe_chatter.stability import floquet; '
+            f'm = Machine(Mode(0.05, {frequency}, 0.05)); '
+            'c = Cut(60.0, 1e-3, speed_variation_amplitude=0.2, speed_variation_frequency=0.05); '
+            'floquet(Machine(), c.with_changes(spindle_speed_rpm=6000.0), seated=False); '
+            'before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss; '
+            'then = time.process_time(); floquet(m, c, seated=False); '
+            'print(time.process_time() - then, '
+            'resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)'
+        )
+        told = subprocess.check_output([sys.executable, '-c', script])  # noqa: S603 -- our own
+        spent, memory = (float(word) for word in told.split())
+        what = f'speed variation, 60 rev/min at 0.05 Hz{name}'
+        figures += [Figure(what, spent, 's'), Figure(f'... its memory{name}', memory / 1e3, 'MB')]
+    return figures
+
+
+def _median(work: Callable[[], object], repeats: int) -> float:
+    """CPU time, s, once everything is loaded."""
+    work()
+    spent = []
+    for _ in range(repeats):
+        then = time.process_time()
+        work()
+        spent.append(time.process_time() - then)
+    return statistics.median(spent)
+
+
 def errors_of_variation() -> list[Figure]:
     """Floquet multipliers at a constant speed, and with twice the elements."""
     constant, refined = [], []
@@ -157,6 +245,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         *errors_of_limits(),
         *advice(options.machines),
         *errors_of_variation(),
+        *structures(options.repeats),
+        *slow_variation(),
     ]
     if options.json:
         print(json.dumps([asdict(figure) for figure in figures], indent=2))

@@ -13,12 +13,12 @@ from lathe_chatter.arrays import Array
 
 _CHECKED = 4
 """Steps after which it is looked whether the eigenvalue has settled."""
-_TOLERANCE = 1e-13
+_TOLERANCE = 1e-12
 _MOST_STEPS = 400
 
 
 def dominant_eigenvalue(
-    carried: Callable[[Array], Array], size: int
+    carried: Callable[[Array], Array], start: Array
 ) -> tuple[complex, NDArray[np.complexfloating[Any, Any]]]:
     """Arnoldi's method with full orthogonalisation.
 
@@ -27,7 +27,7 @@ def dominant_eigenvalue(
 
     Args:
         carried: The map of a vector (size,).
-        size: Of the vectors.
+        start: A vector that has something of the wanted one (size,).
 
     Returns:
         The eigenvalue, with imaginary part >= 0, and its eigenvector (size,).
@@ -35,19 +35,19 @@ def dominant_eigenvalue(
     Raises:
         ArithmeticError: If it does not settle.
     """
+    size = len(start)
     most = min(size, _MOST_STEPS)
     basis = np.zeros((min(most, 32) + 1, size))
     projected = np.zeros((most + 1, most))
-    start = np.random.default_rng(0).standard_normal(size)
-    basis[0] = start / math.sqrt(start @ start)
+    basis[0] = start / math.sqrt(_square(start))
     for k in range(most):
         image = carried(basis[k])
-        length = math.sqrt(image @ image)
+        length = math.sqrt(_square(image))
         for _ in range(2):
             along = np.einsum('kj,j->k', basis[: k + 1], image)
             image -= np.einsum('kj,k->j', basis[: k + 1], along)
             projected[: k + 1, k] += along
-        rest = math.sqrt(image @ image)
+        rest = math.sqrt(_square(image))
         exhausted = k + 1 == size or rest <= 1e-15 * length
         if exhausted or (k + 1) % _CHECKED == 0:
             values, vectors = np.linalg.eig(projected[: k + 1, : k + 1])
@@ -62,3 +62,8 @@ def dominant_eigenvalue(
         projected[k + 1, k] = rest
         basis[k + 1] = image / rest
     raise ArithmeticError('the dominant multiplier does not settle')
+
+
+def _square(vector: Array) -> float:
+    """Its length squared."""
+    return float(np.einsum('j,j->', vector, vector))

@@ -158,17 +158,14 @@ class Element(NamedTuple):
     """What a machine does on an element, with growth measured from a rate.
 
     Attributes:
-        relative: r at the nodes from the state at the start and the force (order, states + order).
-        final: The state at the end, from the same (states, states + order).
-        force: The force at the nodes from r one turn back and the state at the start, by element
-            of a period, or one for all (period or 1, order, order + states).
+        step: r at the nodes and the state at the end, from r one turn back of the nodes and the
+            state at the start, by element of a period or one for all; transposed, so that many
+            results are added up at once (period or 1, order + states, order + states).
         across: r from the state (states,).
         echo: e^(-rate tau) of the surface at each node (period, order).
     """
 
-    relative: Array
-    final: Array
-    force: Array
+    step: Array
     across: Array
     echo: Array
 
@@ -213,7 +210,11 @@ def element_of(
         axis=-1,
     )
     force = np.linalg.solve(coupling, given)
-    return Element(relative, solved[-1], force, across, np.exp(-rate * elements.delay))
+    results = np.concatenate((relative, solved[-1]))
+    step = results[:, states:] @ force
+    step[..., ORDER:] += results[:, :states]
+    step = np.ascontiguousarray(step.swapaxes(-1, -2))
+    return Element(step, across, np.exp(-rate * elements.delay))
 
 
 def carry(
@@ -229,76 +230,59 @@ def carry(
     """
     result = np.ascontiguousarray(vector).copy()
     log = _carry(
-        result, element.relative, element.final, element.force, element.across, element.echo,
-        elements.source, elements.weights, elements.behind, count, rescaled,
+        result, element.step, element.across, element.echo, elements.source, elements.weights,
+        elements.behind, count, rescaled,
     )  # fmt: skip
     return result, float(log)
 
 
 @compiled(nogil=True)
 def _carry(
-    vector: Array, relative: Array, final: Array, force: Array, across: Array, echo: Array,
-    source: Integers, weights: Array, behind: int, count: int, rescaled: bool,
+    vector: Array, step: Array, across: Array, echo: Array, source: Integers, weights: Array,
+    behind: int, count: int, rescaled: bool,
 ) -> float:  # fmt: skip
     """`carry` in place; the logarithm of what was scaled away."""
     states, order = len(across), weights.shape[1]
-    period, forces = len(source), len(force)
+    size, period, steps = order + states, len(source), len(step)
     slots = behind + 1
     ring = np.zeros((slots, order + 1))
-    state, following = vector[:states].copy(), np.empty(states)
-    given, pushed = np.empty(order + states), np.empty(order)
+    state, given, result = vector[:states].copy(), np.empty(size), np.empty(size)
     log = 0.0
     for k in range(behind):
         for j in range(order):
             ring[(k - behind) % slots, j] = vector[states + k * order + j]
-    first = 0.0
-    for i in range(states):
-        first += across[i] * state[i]
-    for k in range(behind):
-        ring[(k - behind) % slots, order] = (
-            ring[(k + 1 - behind) % slots, 0] if k < behind - 1 else first
-        )
+    for k in range(behind - 1):
+        ring[(k - behind) % slots, order] = ring[(k + 1 - behind) % slots, 0]
+    ring[-1 % slots, order] = np.sum(across * state)
     for number in range(count):
         here = number % period
-        base = number - here
-        slot = number % slots
+        slot, base = number % slots, number - here
         for j in range(order):
             before = (source[here, j] + base) % slots
-            total = 0.0
-            for node in range(order + 1):
-                total += weights[here, j, node] * ring[before, node]
-            given[j] = total * echo[here, j]
+            even, odd = weights[here, j, order] * ring[before, order], 0.0
+            for node in range(0, order, 2):
+                even += weights[here, j, node] * ring[before, node]
+                odd += weights[here, j, node + 1] * ring[before, node + 1]
+            given[j] = (even + odd) * echo[here, j]
         first = 0.0
         for i in range(states):
             given[order + i] = state[i]
             first += across[i] * state[i]
-        which = here if forces > 1 else 0
-        for j in range(order):
-            total = 0.0
-            for i in range(order + states):
-                total += force[which, j, i] * given[i]
-            pushed[j] = total
+        which = here if steps > 1 else 0
+        result[:] = 0.0
+        for i in range(size):
+            for k in range(size):
+                result[k] += step[which, i, k] * given[i]
         ring[slot, 0] = first
         for j in range(order):
-            total = 0.0
-            for i in range(states):
-                total += relative[j, i] * state[i]
-            for i in range(order):
-                total += relative[j, states + i] * pushed[i]
-            ring[slot, j + 1] = total
-        for k in range(states):
-            total = 0.0
-            for i in range(states):
-                total += final[k, i] * state[i]
-            for i in range(order):
-                total += final[k, states + i] * pushed[i]
-            following[k] = total
-        state, following = following, state
+            ring[slot, j + 1] = result[j]
+        for i in range(states):
+            state[i] = result[order + i]
         if rescaled and (number % _RESCALED == _RESCALED - 1 or number == count - 1):
-            size = max(np.abs(ring).max(), 1e-300)
-            ring /= size
-            state /= size
-            log += math.log(size)
+            most = max(np.abs(ring).max(), 1e-300)
+            ring /= most
+            state /= most
+            log += math.log(most)
     for i in range(states):
         vector[i] = state[i]
     for k in range(behind):

@@ -137,7 +137,7 @@ def _multiplier(machine: Machine, cut: Cut, elements: Elements, *, seated: bool)
     rate = log / span
     for _ in range(_WARM_UP):
         element = element_of(machine, cut, elements, rate, seated=seated)
-        found, mode = _dominant(elements, element)
+        found, mode = _dominant(elements, element, vector)
         exponent = math.log(abs(found)) if found else -math.inf
         if not _FAR_OFF < abs(exponent) < math.inf:
             break
@@ -152,10 +152,10 @@ def _multiplier(machine: Machine, cut: Cut, elements: Elements, *, seated: bool)
     return Floquet(rate + exponent / span, abs(float(angle)), period)
 
 
-def _dominant(elements: Elements, element: Element) -> tuple[complex, Complex]:
+def _dominant(elements: Elements, element: Element, start: Array) -> tuple[complex, Complex]:
     """The dominant eigenvalue and its vector."""
 
     def carried(vector: Array) -> Array:
         return carry(vector, elements, element, elements.total)[0]
 
-    return dominant_eigenvalue(carried, elements.size(element))
+    return dominant_eigenvalue(carried, start)
