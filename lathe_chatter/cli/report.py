@@ -15,7 +15,7 @@ from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.report import draw_run
 from lathe_chatter.report.history import History, read_history
 from lathe_chatter.report.signal_views import Excerpt, excerpts_of
-from lathe_chatter.stability import rightmost_root
+from lathe_chatter.stability import root_of
 
 NAME = 'report'
 HELP = 'print what happened in a recorded run and draw it'
@@ -185,9 +185,7 @@ def _entry(history: History, time: float, what: str) -> dict[str, Any]:
         if not session.known or (seated and cut.bearing_contact is BearingContact.NONE):
             roots[regime] = {'frequency': None, 'growth_rate': None}
             continue
-        root = rightmost_root(
-            session.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
-        )
+        root = root_of(session.machine, cut, seated=seated)
         roots[regime] = {
             'frequency': root.imag / (2.0 * math.pi),
             'growth_rate': root.real,

@@ -82,7 +82,7 @@ def _verdicts_in(session: CutSession) -> list[dict[str, Any]]:
 def _verdict(time: float, machine: Machine, cut: Cut) -> dict[str, Any]:
     """Growth rate, 1/s, and frequency, Hz, of the rightmost root, open and on the bearing."""
     # Not at the top: the monitor and the recorder would load it at their start.
-    from lathe_chatter.stability import rightmost_root
+    from lathe_chatter.stability import root_of
 
     verdict: dict[str, Any] = {
         'time': time,
@@ -92,7 +92,7 @@ def _verdict(time: float, machine: Machine, cut: Cut) -> dict[str, Any]:
     for name, seated in (('open', False), ('seated', True)):
         if seated and cut.bearing_contact is BearingContact.NONE:
             continue
-        root = rightmost_root(machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated)
+        root = root_of(machine, cut, seated=seated)
         verdict[name] = {
             'growth_rate': root.real,
             'frequency': root.imag / (2.0 * math.pi),

@@ -12,7 +12,7 @@ from lathe_chatter.model import Machine
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for, widen
 from lathe_chatter.report.history import History
 from lathe_chatter.report.signal_views import Excerpt
-from lathe_chatter.stability import contact_at, rightmost_root
+from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,12 +83,7 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
         _say_at_rest(axes, 'no amplitude above 1 nm')
         top = _TOP_AT_REST
     contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
-    root = rightmost_root(
-        session.machine,
-        excerpt.cut.spindle_speed_rpm,
-        excerpt.cut.depth_of_cut,
-        seated=contact.seated,
-    )
+    root = root_of(session.machine, excerpt.cut, seated=contact.seated)
     expected = root.imag / (2.0 * math.pi)
     axes.axvline(expected, color='k', lw=0.9, ls='--', label=f'root, {expected:.1f} Hz')
     axes.axvline(excerpt.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')

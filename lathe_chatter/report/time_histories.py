@@ -25,7 +25,7 @@ from lathe_chatter.plot_style import (
     widen,
 )
 from lathe_chatter.report.history import History
-from lathe_chatter.stability import contact_at, rightmost_root
+from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -139,9 +139,7 @@ def _rate_at(history: History, time: float) -> float:
     cut = history.cut_at(time)
     session = history.session_at(time)
     contact = contact_at(session.machine, cut, tool_leaves_cut=session.tool_leaves_cut)
-    return rightmost_root(
-        session.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
-    ).real
+    return root_of(session.machine, cut, seated=contact.seated).real
 
 
 def apart(series: Array, silence: float) -> Array:

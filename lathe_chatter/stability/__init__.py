@@ -13,7 +13,7 @@ from lathe_chatter.stability.growth_map import GrowthMap, growth_map
 from lathe_chatter.stability.lobes import LobeBoundary, lobe_boundary
 from lathe_chatter.stability.periodic_map import SpeedLaw
 from lathe_chatter.stability.root_count import count_roots_right_of
-from lathe_chatter.stability.roots import leading_roots, rightmost_root, rightmost_roots
+from lathe_chatter.stability.roots import leading_roots, rightmost_root, rightmost_roots, root_of
 from lathe_chatter.stability.safe_limit import (
     ContactAt,
     SafeLimit,
@@ -54,6 +54,7 @@ __all__ = [
     'recommend_speeds',
     'rightmost_root',
     'rightmost_roots',
+    'root_of',
     'safe_limit',
     'seating_depth',
     'stable_speed_intervals',

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.model import Machine
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.stability.characteristic import (
     NO_DAMPING,
@@ -80,6 +80,23 @@ def rightmost_root(
         machine, spindle_speed_rpm, depth_of_cut, seated=seated, process=process
     )
     return complex(found)
+
+
+def root_of(machine: Machine, cut: Cut, *, seated: bool) -> complex:
+    """`rightmost_root` of a cut, with its process damping.
+
+    Args:
+        machine: Tool, workpiece, bearing and material.
+        cut: Speed, depth and process damping.
+        seated: Whether the workpiece rests on its bearing.
+    """
+    return rightmost_root(
+        machine,
+        cut.spindle_speed_rpm,
+        cut.depth_of_cut,
+        seated=seated,
+        process=ProcessDamping.of(cut),
+    )
 
 
 def rightmost_roots(
