@@ -55,6 +55,7 @@ setup(
             'lathe = lathe_chatter.nodes.lathe_node:main',
             'chatter_monitor = lathe_chatter.nodes.monitor_node:main',
             'run_recorder = lathe_chatter.nodes.recorder_node:main',
+            'cell = lathe_chatter.nodes.cell:main',
             'lathe-chatter = lathe_chatter.cli.main:main',
         ],
     },

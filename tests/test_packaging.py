@@ -14,7 +14,7 @@ import pytest
 import lathe_chatter
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = {'lathe', 'chatter_monitor', 'run_recorder', 'lathe-chatter'}
+EXECUTABLES = {'lathe', 'chatter_monitor', 'run_recorder', 'cell', 'lathe-chatter'}
 SOURCES = ('setup.py', 'setup.cfg', 'package.xml', 'pyproject.toml', 'resource', 'config')
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from ear import DEEP, ear, names, wait_for_node
 from processes import (
+    CELL,
     LATHE,
     MONITOR,
     RECORDER,
@@ -51,6 +52,11 @@ def measure_cpu(seconds: float) -> None:
         shares = cpu_shares(pids, seconds)
         for name, share in shares.items():
             print(f'{name + ", all three running":37} {share:5.1f} % of a core')
+        print(f'{"all three":37} {sum(shares.values()):5.1f} % of a core')
+    with running(CELL, '-p', f'run_recorder:output:={folder}-cell') as cell:
+        for name in ('/lathe', '/chatter_monitor', '/run_recorder'):
+            wait_for_node(name)
+        print(f'{"cell, the three in one process":37} {cpu_share(cell, seconds):5.1f} % of a core')
 
 
 def measure_lateness(seconds: float) -> None:

@@ -21,6 +21,7 @@ from lathe_chatter.nodes.node_main import make_executor
 LATHE = 'lathe_chatter.nodes.lathe_node'
 MONITOR = 'lathe_chatter.nodes.monitor_node'
 RECORDER = 'lathe_chatter.nodes.recorder_node'
+CELL = 'lathe_chatter.nodes.cell'
 
 
 @contextlib.contextmanager

@@ -34,7 +34,7 @@ _REST = 40_000_000
 """ns that the node lets samples come in before it looks at them together."""
 _REST_ON_WATCH = 10_000_000
 """ns, likewise, while the vibration grows: an alarm may be due."""
-_SERVE_PERIOD = 200_000_000
+_SERVE_PERIOD = 40_000_000
 """ns from one look for requests to the next: a look costs more than the samples of a rest."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""

@@ -6,7 +6,7 @@ import ctypes
 import sys
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 import rclpy
 from rclpy.duration import Duration
@@ -27,7 +27,6 @@ from lathe_chatter.nodes.deferred_signals import (
     ignore_end_signals,
     raise_on_end_signals,
 )
-from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.real_time import LOOK_UP
 
 try:
@@ -35,7 +34,29 @@ try:
 except ImportError:  # an rclpy older than the executor
     EventsExecutor = None
 
-_Node = TypeVar('_Node', bound=ParameterNode)
+
+class Runnable(Protocol):
+    """A node, or several as one, that `run_node` makes, serves and lets go."""
+
+    @property
+    def context(self) -> Any:
+        """Of rclpy."""
+
+    @property
+    def publishers(self) -> Any:
+        """Everything that it publishes with."""
+
+    def begin(self) -> None:
+        """Begin what has to be finished."""
+
+    def finish(self) -> None:
+        """Put on disk what must be kept."""
+
+    def destroy_node(self) -> None:
+        """Go."""
+
+
+_Node = TypeVar('_Node', bound=Runnable)
 Spin = Callable[[Executor, _Node, Callable[[], bool]], None]
 """Serves a node with an executor until a function says that it is told to end."""
 
@@ -134,7 +155,7 @@ def _refuse_words(args: list[str], usage: str) -> None:
         )
 
 
-def _finish(node: ParameterNode | None) -> None:
+def _finish(node: Runnable | None) -> None:
     """End a node, whatever fails on the way, and then rclpy."""
     try:
         if node is not None:
@@ -160,7 +181,7 @@ def _exit_code() -> int:
     return int(error.code or 0) if isinstance(error, SystemExit) else 1
 
 
-def _deliver(node: Node) -> None:
+def _deliver(node: Runnable) -> None:
     """Wait until readers have what was published: with its publishers a node's history goes."""
     until = time.monotonic() + _DELIVERY_TIMEOUT
     for publisher in node.publishers:
@@ -185,7 +206,7 @@ def serve(executor: Executor, node: Node, ended: Callable[[], bool]) -> None:
         executor.shutdown()
 
 
-def make_executor(node: Node, *, by_events: bool = True) -> Executor:
+def make_executor(node: Any, *, by_events: bool = True) -> Executor:
     """The executor of a node's process.
 
     The one driven by events costs a third of the default one at 500 ticks a second. Its `spin`

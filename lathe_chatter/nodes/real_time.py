@@ -23,7 +23,7 @@ import os
 import platform
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -168,6 +168,63 @@ class Tickable(Protocol):
         """Look after the scheduling of this thread, from time to time."""
 
 
+class Schedule:
+    """Tasks of a node that is woken, each at a period of its own.
+
+    Args:
+        tasks: Period, s, and what is to be done.
+    """
+
+    def __init__(self, *tasks: tuple[float, Callable[[], object]]) -> None:
+        """Let each be due for the first time one period from now."""
+        now = time.monotonic_ns()
+        self._tasks = [(int(SECOND * period), task) for period, task in tasks]
+        self._due = [now + period for period, _ in self._tasks]
+
+    def next_due(self) -> int:
+        """When something is to be done, ns of time.monotonic_ns()."""
+        return min(self._due)
+
+    def run(self) -> None:
+        """Do what is due, in the order in which the tasks were given; late is not twice."""
+        now = time.monotonic_ns()
+        for k, (period, task) in enumerate(self._tasks):
+            if now >= self._due[k]:
+                self._due[k] = max(self._due[k] + period, now)
+                task()
+
+
+@dataclass
+class Served:
+    """A node in a loop that wakes and serves several.
+
+    Attributes:
+        executor: Serves its requests.
+        node: Which; its times come first.
+        serve_period: ns after which the executor looks for requests that nobody knows of.
+    """
+
+    executor: Executor
+    node: Tickable
+    serve_period: int = SERVE_PERIOD
+    _serve_at: int = 0
+    _spent: int = 0
+
+    def serve(self, until: int) -> None:
+        """Serve what waits, and what comes until then, ns of time.monotonic_ns()."""
+        now = time.monotonic_ns()
+        if now >= self._serve_at:
+            busy = _serve(self.executor, self.node.requests, until, self._spent)
+            self._serve_at, self._spent = 0 if busy else now + self.serve_period, 0
+            self.node.update_scheduling()
+
+    def wake(self) -> None:
+        """Wake it, and note what it took."""
+        began = time.monotonic_ns()
+        self.node.wake()
+        self._spent += time.monotonic_ns() - began
+
+
 def spin_in_ticks(
     executor: Executor,
     node: Tickable,
@@ -182,29 +239,37 @@ def spin_in_ticks(
         ended: Looked at after each tick, and ten times a second while there is none.
         serve_period: ns after which the executor looks for requests that nobody knows of.
     """
-    executor.add_node(node)
-    serve_at = spent = 0
+    spin_together([Served(executor, node, serve_period)], ended)
+
+
+def spin_together(served: Sequence[Served], ended: Callable[[], bool]) -> None:
+    """Wake and serve several nodes of one context.
+
+    Args:
+        served: The first of them is waited with for requests; the others are looked after.
+        ended: As for `spin_in_ticks`.
+    """
+    for each in served:
+        each.executor.add_node(each.node)
     try:
-        while node.context.ok() and not ended():
-            wake_at = node.next_wake()
-            if wake_at is None:
-                executor.spin_once(timeout_sec=LOOK_UP)
-                continue
+        while served[0].node.context.ok() and not ended():
+            times = [each.node.next_wake() for each in served]
+            next_look = time.monotonic_ns() + int(SECOND * LOOK_UP)
+            earliest = min([at for at in times if at is not None] + [next_look])
+            for each in served[:0:-1]:
+                each.serve(until=0)
+            served[0].serve(until=earliest - _MARGIN)
+            left = earliest - time.monotonic_ns()
+            if left > 0:
+                time.sleep(left / SECOND)
             now = time.monotonic_ns()
-            if now >= serve_at:
-                busy = _serve(executor, node.requests, wake_at - _MARGIN, spent)
-                serve_at = 0 if busy else now + serve_period
-                spent = 0
-                node.update_scheduling()
-            now = time.monotonic_ns()
-            if wake_at > now:
-                time.sleep((wake_at - now) / SECOND)
-            began = time.monotonic_ns()
-            node.wake()
-            spent += time.monotonic_ns() - began
+            for each, at in zip(served, times, strict=True):
+                if at is not None and at <= now:
+                    each.wake()
     finally:
-        executor.remove_node(node)
-        executor.shutdown()
+        for each in served:
+            each.executor.remove_node(each.node)
+            each.executor.shutdown()
 
 
 def _serve(executor: Executor, requests: RequestLoad, until: int, spent: int) -> bool:

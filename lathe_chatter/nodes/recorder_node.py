@@ -18,6 +18,7 @@ from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import RECORDER
+from lathe_chatter.nodes.real_time import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
 from lathe_chatter.nodes.recording_status import news, recording_status
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
@@ -58,13 +59,15 @@ class RecorderNode(ParameterNode):
     message too. The number that each publisher gives its messages tells of every loss.
 
     Args:
+        by_timer: Whether timers let it work, so that any executor will do; else its loop calls
+            `wake` (`real_time.spin_in_ticks`), which costs a third.
         options: As for `rclpy.node.Node`.
 
     Raises:
         ParameterError: If a parameter given at the start is not allowed.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, by_timer: bool = True, **options: Any) -> None:
         """Make the node; `begin` begins to record."""
         super().__init__('run_recorder', RECORDER, **options)
         self._writer: RunWriter | None = None
@@ -73,11 +76,28 @@ class RecorderNode(ParameterNode):
         self._log, self._stalls = RunLog(), ReceiveStalls()
         self._diagnostics = Diagnostics(self, 'run recorder')
         recorder_services.create_services(self)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_TAKE_PERIOD, self._take, clock=steady)
-        self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
-        self.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
-        self.create_timer(1.0, self._report, clock=steady)
+        tasks = (
+            (_TAKE_PERIOD, self._take),
+            (_LOOK_PERIOD, self._look),
+            (_COMMIT_PERIOD, self._commit),
+            (1.0, self._report),
+        )
+        self._schedule = Schedule(*tasks)
+        if by_timer:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            for period, task in tasks:
+                self.create_timer(period, task, clock=steady)
+
+    def next_wake(self) -> int:
+        """When it works next, ns of time.monotonic_ns()."""
+        return self._schedule.next_due()
+
+    def wake(self) -> None:
+        """Do what is due."""
+        self._schedule.run()
+
+    def update_scheduling(self) -> None:
+        """It needs no place of its own in the scheduling: late is not lost."""
 
     def begin(self) -> None:
         """Begin to record, unless `autostart` is false.
@@ -289,7 +309,12 @@ def main() -> None:
     """
     try:
         # The executor driven by events would call for each message.
-        run_node(RecorderNode, by_events=False, usage=RECORDER.usage('run_recorder'))
+        run_node(
+            lambda: RecorderNode(by_timer=False),
+            by_events=False,
+            spin=spin_in_ticks,
+            usage=RECORDER.usage('run_recorder'),
+        )
     except RecordingFailedError as error:
         sys.stderr.write(f'{error}\n')
         raise SystemExit(_FAILED) from None

@@ -24,6 +24,7 @@ MODULES = {
     'lathe': 'lathe_chatter.nodes.lathe_node',
     'chatter_monitor': 'lathe_chatter.nodes.monitor_node',
     'run_recorder': 'lathe_chatter.nodes.recorder_node',
+    'cell': 'lathe_chatter.nodes.cell',
 }
 _PACKAGE = Path(lathe_chatter.__file__).parents[1]
 _PLENTY = 50_000
