@@ -400,7 +400,7 @@ class LatheNode(ParameterNode):
     def _clock_complaint(self) -> str:
         """What is wrong with /clock, where this node drives or follows it."""
         owners = self.count_publishers('/clock')
-        if self._follows and not owners:
+        if self._follows and not (owners and self._now()):
             return 'waiting for /clock'
         if (self._follows or self.values['publish_clock']) and owners > 1:
             return f'{owners} nodes publish /clock: it must have one owner'

@@ -167,7 +167,8 @@ class TickStatistics:
 
     def cutting(self, control: RunControl, lathe: VirtualLathe) -> Status:
         """The status of the cut."""
-        ticks = max(1, self.ticks - self._before.ticks)
+        made = self.ticks - self._before.ticks
+        ticks = max(1, made)
         cut = lathe.cut
         values = {
             'simulated time, s': lathe.time,
@@ -182,4 +183,11 @@ class TickStatistics:
         }
         if control.ended_because:
             return Status('cut', ERROR, control.ended_because, values)
-        return Status('cut', OK, 'cutting' if cut.depth_of_cut else 'no depth of cut', values)
+        message = 'cutting'
+        if not made:
+            message = 'at rest'
+        elif not cut.depth_of_cut:
+            message = 'no depth of cut'
+        elif not self._in_cut:
+            message = 'out of the cut'
+        return Status('cut', OK, message, values)

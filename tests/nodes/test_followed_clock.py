@@ -103,3 +103,9 @@ def test_a_clock_that_goes_back_or_stands_still_is_told(
     clock.show(50_004)
     clock.said('/clock goes on at 50.004 s.')
     clock.show(50_006)
+
+
+def test_without_a_clock_it_waits_and_says_so(start: Callable[..., Any], bench: Bench) -> None:
+    clock = FollowedClock(start, bench)  # a publisher is there, and has shown nothing
+    clock.pace('waiting for /clock')
+    assert not clock.joints

@@ -13,6 +13,8 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.context import Context
+from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy, qos_profile_parameters
 from rclpy.time import Time as Time_
 from rosgraph_msgs.msg import Clock
@@ -21,6 +23,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from support.node_bench import DEEP, LATCHED, Bench, messages_of, samples_of
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.cut_events import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
@@ -468,3 +471,22 @@ def test_a_flood_of_requests_is_told(start: Callable[..., Any], bench: Bench) ->
     assert found.level == DiagnosticStatus.WARN
     (share,) = (v.value for v in found.values if v.key == 'time taken by requests, fraction')
     assert float(share) > FLOOD
+
+
+def test_a_flood_of_knocks_is_bounded_and_told(start: Callable[..., Any], bench: Bench) -> None:
+    log = bench.listen_first(Log, '/rosout', LATCHED)
+    node = start(LatheNode)
+    for _ in range(1002):  # all between two ticks, which only the executor makes
+        node._on_knock(Float64(data=1e-6))
+
+    def said(words: str) -> list[str]:
+        return [entry.msg for entry in log if words in entry.msg]
+
+    bench.spin_until(lambda: said('More than 1000 knocks between two ticks'), 'the warning')
+    bench.spin_until(lambda: said('knock of 0.001 N s'), 'all that were kept as one knock')
+
+
+def test_it_cannot_drive_the_clock_that_it_follows(context: Context) -> None:
+    overrides = [Parameter(name, value=True) for name in ('use_sim_time', 'publish_clock')]
+    with pytest.raises(ParameterError, match='for /clock has one owner'):
+        LatheNode(context=context, parameter_overrides=overrides)
