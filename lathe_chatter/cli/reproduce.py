@@ -182,14 +182,8 @@ def figures_of(results: list[Reproduced], findings: Findings) -> dict[str, Any]:
         'agreeing': sum(result.agrees for result in results),
         'cutting_coefficient': asdict(findings.coefficient)
         | {'readings': [asdict(reading) for reading in findings.readings]},
-        'screening_function': [
-            {
-                'contact': reading.contact,
-                'verdicts': reading.verdicts,
-                'against': reading.against,
-            }
-            for reading in findings.screening
-        ],
+        'screening_function': findings.screening,
+        'axes_without_bearing': findings.axes_without_bearing,
         'clearance': asdict(findings.clearance),
         'bearing_stiffness': {
             'share_of_workpiece': stiffness.shares,
@@ -217,7 +211,7 @@ def _show(results: list[Reproduced], findings: Findings, screen: Screen) -> None
     ]
     screen.table(titles, rows)
     found = findings.coefficient
-    verdicts = {reading.contact.value: reading.verdicts for reading in findings.screening}
+    verdicts = {reading.reading.value: reading.verdicts for reading in findings.screening}
     count = len(results)
     agreeing = sum(result.agrees for result in results)
     screen.say(
@@ -226,7 +220,8 @@ def _show(results: list[Reproduced], findings: Findings, screen: Screen) -> None
         'printed.\n'
         f'All verdicts hold together for {found.low:.5g} < C < {found.high:.5g} N/m2.\n'
         f'Screening function never 1: {verdicts["none"]} of {count} verdicts hold; as printed: '
-        f'{verdicts["gap"]}; always 1: {verdicts["seated"]}.'
+        f'{verdicts["gap"]}; always 1: {verdicts["seated"]}; as printed, but its sign turned '
+        f'round: {verdicts["reversed"]}.'
     )
 
 

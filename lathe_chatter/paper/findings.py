@@ -13,8 +13,14 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Machine
-from lathe_chatter.paper.reproduction import SAMPLE_RATE, Literal, paper_lathe, reproduce_literally
-from lathe_chatter.paper.runs import AXES, PAPER_RUNS, PaperRun, run_named
+from lathe_chatter.paper.figures import WINDOWS
+from lathe_chatter.paper.reproduction import SAMPLE_RATE, paper_lathe
+from lathe_chatter.paper.runs import AXES, PAPER_RUNS, run_named
+from lathe_chatter.paper.screening import (
+    ScreeningReading,
+    axes_without_bearing,
+    screening_readings,
+)
 from lathe_chatter.stability import critical_depth, rightmost_roots
 
 MANTISSA = 3.5
@@ -47,21 +53,6 @@ class CoefficientRange:
     high: float
     too_low_for: str
     too_high_for: str
-
-
-@dataclass(frozen=True)
-class ScreeningReading:
-    """One reading of the screening function.
-
-    Attributes:
-        contact: As the software names it.
-        verdicts: How many of the paper's hold with it.
-        against: Names of the runs that it gets wrong.
-    """
-
-    contact: BearingContact
-    verdicts: int
-    against: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -114,6 +105,7 @@ class Findings:
     readings: tuple[CoefficientReading, ...]
     coefficient: CoefficientRange
     screening: tuple[ScreeningReading, ...]
+    axes_without_bearing: tuple[float, float] | None
     clearance: ClearanceEffect
     stiffness: StiffnessEffect
     windows: tuple[Window, ...]
@@ -134,12 +126,13 @@ def find(machine: Machine | None = None, tell: Callable[[str], None] = lambda _:
     )
     coefficient = coefficient_range(paper)
     tell('the screening function')
-    screening = screening_readings(paper)
+    screening = screening_readings(paper, WINDOWS)
     tell('clearance, stiffness and duration')
     return Findings(
         readings,
         coefficient,
         screening,
+        axes_without_bearing(paper),
         clearance_effect(paper),
         stiffness_effect(paper),
         tuple(figure_window(rpm, paper) for rpm in (3000.0, 10000.0)),
@@ -193,39 +186,6 @@ def _edge(machine: Machine, inside: float, outside: float) -> tuple[float, str]:
         if not holds
     ]
     return inside, '; '.join(failed)
-
-
-def screening_readings(machine: Machine) -> tuple[ScreeningReading, ...]:
-    """How many verdicts hold with the bearing never touched, as printed, and always carrying."""
-    judged: dict[BearingContact, list[bool]] = {}
-    ends = {run.name: reproduce_literally(run, machine) for run in PAPER_RUNS if run.has_bearing}
-    for contact, seated in ((BearingContact.NONE, False), (BearingContact.SEATED, True)):
-        speeds, depths = (
-            np.array([getattr(run, name) for run in PAPER_RUNS])
-            for name in ('spindle_speed_rpm', 'depth_of_cut')
-        )
-        floating = rightmost_roots(machine, speeds, depths, seated=False).real
-        resting = rightmost_roots(machine, speeds, depths, seated=seated).real
-        judged[contact] = [
-            bool((on if run.has_bearing else off) > 0.0) == run.unstable
-            for run, on, off in zip(PAPER_RUNS, resting, floating, strict=True)
-        ]
-    judged[BearingContact.GAP] = [
-        _literal_holds(run, ends.get(run.name), holds)
-        for run, holds in zip(PAPER_RUNS, judged[BearingContact.NONE], strict=True)
-    ]
-    return tuple(
-        ScreeningReading(
-            contact,
-            sum(judged[contact]),
-            tuple(r.name for r, ok in zip(PAPER_RUNS, judged[contact], strict=True) if not ok),
-        )
-        for contact in BearingContact
-    )
-
-
-def _literal_holds(run: PaperRun, literal: Literal | None, without: bool) -> bool:  # noqa: FBT001
-    return without if literal is None else literal.unstable == run.unstable
 
 
 def clearance_effect(machine: Machine) -> ClearanceEffect:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.model import BearingContact
 from lathe_chatter.paper.figures import Picture, paper_pictures
 from lathe_chatter.paper.findings import Findings, StiffnessEffect, Window
 from lathe_chatter.paper.reproduction import AGREEMENT, Reproduced
 from lathe_chatter.paper.runs import PAPER_RUNS, run_named
+from lathe_chatter.paper.screening import Reading
 
 OVERVIEWS = (
     Picture('growth', 'Growth in time', 'Each run against the slope that its root gives it.'),
@@ -20,11 +21,14 @@ OVERVIEWS = (
     Picture('findings', 'Findings', 'Left: C. Right: the stiffness of the bearing.'),
 )
 PAGE = 'index.html'
+_FAST = 10000.0
+"""rev/min of the run whose axes tell two readings apart."""
 _TEMPLATE = 'page.html.j2'
 _MEANINGS = {
-    BearingContact.NONE: 'never 1: the bearing is never touched',
-    BearingContact.GAP: 'equation (9) as printed: 1 while x_wp ≥ clearance',
-    BearingContact.SEATED: 'always 1: the workpiece rests on its bearing',
+    Reading.NONE: 'never 1: the bearing is never touched',
+    Reading.GAP: 'equation (9) as printed: 1 while x_wp ≥ clearance',
+    Reading.SEATED: 'always 1: the workpiece rests on its bearing',
+    Reading.REVERSED: 'reversed: 1 while x_wp < clearance',
 }
 
 
@@ -54,6 +58,8 @@ def write_page(
             if picture in pictures
         ]
 
+    with_bearing = sum(run.has_bearing for run in PAPER_RUNS)
+    whole = [r for r in findings.screening if r.verdicts == len(PAPER_RUNS)]
     source = files('lathe_chatter.paper').joinpath(_TEMPLATE).read_text(encoding='utf-8')
     environment = Environment(autoescape=True, undefined=StrictUndefined)
     text = environment.from_string(source).render(
@@ -67,12 +73,17 @@ def write_page(
         ],
         readings=[
             (
-                _MEANINGS[reading.contact],
+                _MEANINGS[reading.reading],
                 f'{reading.verdicts} of {len(PAPER_RUNS)}',
                 '; '.join(run_named(name).title for name in reading.against) or '-',
+                _range(reading.coefficient, 1e-6, 4),
+                _range(reading.axes_met, 1e3, 1),
+                f'{reading.same_as_seated} of {with_bearing}',
             )
             for reading in findings.screening
         ],
+        whole_readings=[_MEANINGS[reading.reading] for reading in whole],
+        **_axes(findings),
         literal=[row for result in results for row in _literal_rows(result)],
         clearances=[
             (f'{gap * 1e6:g}', f'{rate:+.6f}', f'{size * 1e6:.3f}', f'{size / gap:.4f}')
@@ -94,6 +105,40 @@ def write_page(
     page = folder / PAGE
     page.write_text(text + '\n', encoding='utf-8')
     return page
+
+
+def _range(ends: tuple[float, float] | None, factor: float, digits: int) -> str:
+    """From and to, or that there is none."""
+    if ends is None:
+        return 'none'
+    return ' to '.join(f'{end * factor:.{digits}f}' for end in ends)
+
+
+def _axes(findings: Findings) -> dict[str, Any]:
+    """When the readings meet the axes of the run that tells them apart, and in how many turns."""
+    met = {reading.reading.value: reading.axes_met for reading in findings.screening}
+    without = findings.axes_without_bearing or (math.inf, -math.inf)
+    apart = [met[name] or (math.inf, -math.inf) for name in ('seated', 'reversed')]
+    return {
+        'axes': {name: _range(ends, 1e3, 1) for name, ends in met.items()},
+        'turns': {name: _range(ends, _FAST / 60.0, 2) for name, ends in met.items()},
+        'whole_turns': {
+            name: ' and '.join(map(str, range(*_whole_turns(ends)))) if ends else 'none'
+            for name, ends in met.items()
+        },
+        'axes_without': _range(findings.axes_without_bearing, 1e3, 1),
+        'neither_excluded': all(low <= without[1] and without[0] <= high for low, high in apart),
+        'same': next(
+            f'{reading.same_as_seated} of {sum(run.has_bearing for run in PAPER_RUNS)}'
+            for reading in findings.screening
+            if reading.reading is Reading.REVERSED
+        ),
+    }
+
+
+def _whole_turns(ends: tuple[float, float]) -> tuple[int, int]:
+    """The first whole number of turns in a time, s, and the first beyond it."""
+    return math.ceil(ends[0] * _FAST / 60.0), math.floor(ends[1] * _FAST / 60.0) + 1
 
 
 def _run_row(result: Reproduced) -> tuple[str, ...]:

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lathe_chatter.model import BearingContact, Machine
+from lathe_chatter.model import Machine
 from lathe_chatter.paper.findings import (
     clearance_effect,
     coefficient_range,
     figure_window,
-    screening_readings,
     stiffness_effect,
     verdicts_at,
 )
@@ -37,15 +36,6 @@ def test_as_printed_c_leaves_only_the_stable_verdicts() -> None:
     assert sum(verdicts_at(MACHINE, 3.5e-9)) == 2
     assert all(verdicts_at(MACHINE, 3.5e6))
     assert sum(verdicts_at(MACHINE, 3.5e9)) == 12
-
-
-def test_only_the_screening_function_at_1_gives_every_verdict() -> None:
-    readings = {reading.contact: reading for reading in screening_readings(MACHINE)}
-    assert readings[BearingContact.SEATED].verdicts == 14
-    wrong = readings[BearingContact.GAP].against
-    assert len(wrong) == 6
-    assert wrong == readings[BearingContact.NONE].against
-    assert all('bc' in name and name.endswith('-0.5') for name in wrong)
 
 
 def test_a_stiffer_bearing_moves_the_verdict_not_a_larger_clearance() -> None:

@@ -42,6 +42,12 @@ def test_pictures_stand_within_the_page(tmp_path: Path) -> None:
     assert all(source.startswith('data:image/svg+xml;base64,') for source in page.sources)
     assert set(page.links) == {p.name for p in chosen} <= page.names
     assert 'http' not in text
+    words = ' '.join(text.split())
+    assert 'from 119.8 to 123.2 ms' in words
+    assert 'holds 20, the second 19' in words
+    assert 'excludes neither' in words
+    assert 'dde23' in words
+    assert 'Only with the screening' not in words
     for result in results:
         assert f'{result.root.real:+.6f}' in text
         assert result.run.title in text
