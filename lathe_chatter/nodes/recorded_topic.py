@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
-from importlib import import_module
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.duration import Infinite
@@ -14,11 +13,16 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.nodes.topic_types import MessageType
 from lathe_chatter.recording import Topic
+from lathe_chatter.recording.ros_messages import LOG_TYPE, PARAMETER_EVENT_TYPE
 from lathe_chatter.recording.sequence_gaps import Numbering
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 _BACKLOG = 10_000
 """Messages that may wait here: 1 s of a lathe at 20 times real time."""
+_STREAMS = (SAMPLES_TYPE, LOG_TYPE, PARAMETER_EVENT_TYPE)
+"""Types of which the latest message alone says nothing."""
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
 Write = Callable[[str, bytes, int, int, int], None]
@@ -34,36 +38,56 @@ class RecordedTopic:
     Args:
         node: Which subscribes.
         topic: What it is.
+        message_class: Of its type.
         offers: What its publishers offer.
         write: Where messages go.
+        since: When the recording began, ns since the epoch.
+        may_be_older: Whether it may have been there before this recording began.
 
     Attributes:
         messages: How many came.
-        numbering: Says which did not.
+        paused: Whether what comes is left out; its numbers are followed.
+        numbering: Says which did not come.
     """
 
-    def __init__(
-        self, node: Node, topic: Topic, offers: list[TopicEndpointInfo], write: Write
+    def __init__(  # noqa: PLR0913 -- who, what, and where to
+        self,
+        node: Node,
+        topic: Topic,
+        message_class: Any,
+        offers: list[TopicEndpointInfo],
+        write: Write,
+        *,
+        since: int,
+        may_be_older: bool,
     ) -> None:
         """Subscribe."""
         self.topic = topic
         self.messages = 0
+        self.paused = False
         self.numbering = Numbering()
-        self._kept = all(_keeps(offer.qos_profile) for offer in offers)
+        # Who keeps little has replaced what it had: how much of that was before is not known.
+        self._kept = not may_be_older and all(_keeps(offer.qos_profile) for offer in offers)
+        self._since = since
         self._node = node
         self._write = write
-        self._class = _message_class(topic.type)
+        self._class = message_class
         self._subscribe(_matching(offers))
 
     @property
     def lost(self) -> int:
-        """Messages that are missing: also before the first, where publishers keep them."""
+        """Messages that are missing: also before the first, where it should have come."""
         return self.numbering.lost + (self.numbering.before if self._kept else 0)
 
     def reception(self) -> dict[str, int]:
         """What came, what is known to be lost, and how many were before the first."""
         numbering = self.numbering
         return {'messages': self.messages, 'lost': numbering.lost, 'before': numbering.before}
+
+    def is_of(self, offers: list[TopicEndpointInfo]) -> bool:
+        """Whether somebody still publishes the type that is being recorded, or nobody any."""
+        kinds = {offer.topic_type for offer in offers}
+        return not kinds or self.topic.type in kinds
 
     def look(self, offers: list[TopicEndpointInfo]) -> None:
         """Follow the graph: new publishers may offer less than those before."""
@@ -86,33 +110,30 @@ class RecordedTopic:
 
     def take(self) -> None:
         """Take everything that has arrived."""
+        taken, numbering, name, write = 0, self.numbering, self.topic.name, self._write
+        steady = time.monotonic()
         for data, info in self._subscription.take():
-            self._write_one(data, info)
+            number = info['publication_sequence_number'] or 0  # None where there is none
+            if number:
+                numbering.take(number, steady)
+            published = info['source_timestamp']
+            if not (self.messages or taken) and published and published < self._since:
+                self._kept = False  # it was there before: its first messages are not lost
+            taken += 1
+            if not self.paused:
+                received = info['received_timestamp'] or time.time_ns()
+                write(name, data, received, published or received, number)
+        if not self.paused:
+            self.messages += taken
 
-    def _write_one(self, data: bytes, info: Mapping[str, Any]) -> None:
-        number = info['publication_sequence_number'] or 0  # None where the middleware has none
-        if number:
-            self.numbering.take(number, time.monotonic())
-        self.messages += 1
-        now = time.time_ns()
-        log_time = info['received_timestamp'] or now
-        self._write(self.topic.name, data, log_time, info['source_timestamp'] or now, number)
 
-
-def topic_of(name: str, offers: list[TopicEndpointInfo], types: Any) -> Topic | None:
-    """What a topic is, by its publishers and rosbags' types; None where its type is unknown."""
-    kind = offers[0].topic_type
-    if kind not in types.fielddefs:
-        return None
-    definition, _ = types.generate_msgdef(kind, ros_version=2)
+def topic_of(name: str, kind: MessageType, offers: list[TopicEndpointInfo]) -> Topic:
+    """What a topic is, by its type and its publishers."""
     profiles = tuple(_profile(offer.qos_profile) for offer in offers)
-    return Topic(name, kind, definition, types.hash_rihs01(kind), profiles)
-
-
-def _message_class(kind: str) -> Any:
-    """The class of a type named as `std_msgs/msg/Bool`."""
-    package, _, name = kind.split('/')
-    return getattr(import_module(f'{package}.msg'), name)
+    latched = all(_latched(offer.qos_profile) for offer in offers)
+    # How many messages a publisher keeps is not said: of a stream or a log no part is repeated.
+    repeated = len(offers) if latched and kind.name not in _STREAMS else 0
+    return Topic(name, kind.name, kind.definition, kind.type_hash, profiles, repeated=repeated)
 
 
 def _keeps(qos: QoSProfile) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +21,14 @@ from lathe_chatter.nodes.real_time import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_topic import RecordedTopic
 from lathe_chatter.nodes.recording_status import news, recording_status
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
-from lathe_chatter.nodes.topic_watch import TopicWatch
+from lathe_chatter.nodes.run_folders import RunFolders
+from lathe_chatter.nodes.topic_watch import TopicWatch, selection
 from lathe_chatter.recording import RunWriter
+from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence
 from lathe_chatter.recording.provenance import (
     IDENTITY,
     PARAMETERS,
+    PAUSES,
     RECEPTION,
     STALLS,
     identity,
@@ -35,6 +37,7 @@ from lathe_chatter.recording.provenance import (
 from lathe_chatter.recording.receive_stalls import ReceiveStalls
 from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.recording.snapshot import SnapshotBuffer
 from lathe_chatter.samples.continuity import BlockOrder
 
 _COMMIT_PERIOD = 0.25
@@ -43,6 +46,8 @@ _TAKE_PERIOD = 0.02
 """s between two times that what has arrived is taken."""
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
+_NEWS_PERIOD = 10.0
+"""s after what was said of missing samples until more is."""
 _FAILED = 1
 
 _NOTHING = Answer(done=False, message='Nothing is being recorded.')
@@ -71,9 +76,13 @@ class RecorderNode(ParameterNode):
         """Make the node; `begin` begins to record."""
         super().__init__('run_recorder', RECORDER, **options)
         self._writer: RunWriter | None = None
+        self._snapshot: SnapshotBuffer | None = None
         self._watch: TopicWatch | None = None
-        self._failure, self._runs = '', 0
+        self._failure = ''
+        self._folders = RunFolders(self.values)
         self._log, self._stalls = RunLog(), ReceiveStalls()
+        self._clock_watch = ClockWatch()
+        self._flags, self._next_news = 0, 0.0
         self._diagnostics = Diagnostics(self, 'run recorder')
         recorder_services.create_services(self)
         tasks = (
@@ -131,8 +140,8 @@ class RecorderNode(ParameterNode):
         """Whether the parameters of a node, by its full name, are in the run."""
         return node in self._noted
 
-    def start(self) -> Path:
-        """Begin a run.
+    def start(self) -> Path | None:
+        """Begin a run, or to keep the last seconds; the folder of the run, if there is one.
 
         Raises:
             RunExistsError: If its folder exists.
@@ -140,56 +149,62 @@ class RecorderNode(ParameterNode):
         """
         if self._writer is not None:
             raise LatheChatterError(f'Already recording into {self._writer.folder}.')
+        if self._snapshot is not None:
+            raise LatheChatterError('Already keeping the last in memory.')
         values: Any = self.values
-        now = f'{datetime.now().astimezone():%Y%m%d-%H%M%S}'
-        folder = Path(values['output'] or Path('runs', now))
-        if self._runs:  # the second of this node stands beside its first
-            folder = folder.with_name(f'{folder.name}-{self._runs + 1}')
-        try:
-            self._writer = RunWriter(
-                folder,
-                min_free_space=values['min_free_space'],
-                split_duration=values['split_duration'],
-            )
-        except OSError as error:
-            raise LatheChatterError(
-                f'The run {folder} cannot be made: {reason_of(error)}.'
-            ) from None
+        wanted = selection(self, values)
+        if values['snapshot']:
+            self._snapshot = SnapshotBuffer(values['snapshot'])
+        else:
+            self._writer = self._folders.new_run(RunWriter)
+        sink: RunWriter | SnapshotBuffer | None = self._writer or self._snapshot
+        assert sink is not None  # noqa: S101 -- for the types
         self._failure = ''
-        self._runs += 1
-        self._watch = TopicWatch(self, values['topics'], self._writer, self._write)
+        self._watch = TopicWatch(self, wanted, sink, self._write)
         self._log, self._stalls = RunLog(), ReceiveStalls()
+        self._clock_watch, self._flags = ClockWatch(), 0
+        self._left_out = 0
         self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
-        self._snapshots = RemoteParameters(self, self._note_parameters)
+        self._parameters = RemoteParameters(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
-        self._writer.note(IDENTITY, {**identity(), 'middleware': middleware})
+        sink.note(IDENTITY, {**identity(), 'middleware': middleware})
         for name in values['attachments']:
-            self._attach(Path(name))
-        self.get_logger().info(f'Recording into {folder}.')
+            self._attach(sink, Path(name))
+        where = f'into {self.run}' if self.run else f'the last {values["snapshot"]:g} s in memory'
+        self.get_logger().info(f'Recording {where}.')
         self._look()
-        return folder
+        return self.run
 
-    def _attach(self, file: Path) -> None:
+    def _attach(self, sink: RunWriter | SnapshotBuffer, file: Path) -> None:
         try:
-            if self._writer is not None:
-                self._writer.attach_file(file)
+            sink.attach_file(file)
         except OSError as error:
             self.get_logger().warning(f'{file} is not attached to the run: {reason_of(error)}.')
 
     def stop(self) -> Answer:
         """Finish the run, with everything that has arrived."""
-        if self._writer is None or self._watch is None:
+        if self._watch is None or (self._writer is None and self._snapshot is None):
             return _NOTHING
         self._watch.end()
-        self._log_news()
+        if self._snapshot is not None:
+            self._snapshot = None
+            return Answer(done=True, message='What was in memory is dropped.')
+        if self._writer is None:
+            return _NOTHING
+        self._log_news(last=True)
         writer, self._writer = self._writer, None
         stalls = {STALLS: str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
         try:
+            writer.commit()
+            if self._log.pauses:
+                writer.note(PAUSES, self._log.pause_values())
             writer.note(RECEPTION, {**self._watch.reception(), **stalls})
             writer.note(SUMMARY, closing_summary(self._log, self._noted))
             writer.close()
-        except OSError as error:
-            self._failure = f'The end of {writer.folder} is not on disk: {reason_of(error)}.'
+        except (OSError, LatheChatterError) as error:
+            said = str(error) if isinstance(error, LatheChatterError) else reason_of(error)
+            self._failure = f'The end of {writer.folder} is not on disk: {said}'.rstrip('.') + '.'
+            writer.abandon()
             return Answer(done=False, message=self._failure)
         lost = sum(map(self.lost_of, self._topics))
         count = sum(map(self.messages_of, self._topics))
@@ -210,6 +225,35 @@ class RecorderNode(ParameterNode):
             self._fail(error)
         return Answer(done=True, message='Going on in a new file.')
 
+    def snapshot(self, reason: str) -> Answer:
+        """Write what is in memory as a run of its own, and go on."""
+        kept = self._snapshot
+        if kept is None:
+            said = 'Nothing is kept in memory: the parameter snapshot says how long to keep it.'
+            return Answer(done=False, message=said)
+        if self._watch is not None:
+            self._watch.take()
+
+        def save(folder: Path, **options: Any) -> tuple[Path, int]:
+            return folder, kept.save(folder, reason, self._noted, **options)
+
+        try:
+            folder, count = self._folders.new_run(save)
+        except LatheChatterError as error:
+            return Answer(done=False, message=str(error))
+        return Answer(done=True, message=f'{folder} holds the last {count} messages.')
+
+    def pause(self, *, pause: bool) -> Answer:
+        """Leave out what comes from now on, or no longer; asking for what is so is no error."""
+        if self._watch is None or (self._writer is None and self._snapshot is None):
+            return _NOTHING
+        if pause == self._watch.paused:
+            return Answer(done=True, message='It is so already.')
+        self._watch.pause(pause=pause)
+        (self._log.pause if pause else self._log.resume)(time.time_ns())
+        said = 'What comes is left out.' if pause else 'Recording goes on.'
+        return Answer(done=True, message=said)
+
     def finish(self) -> None:
         """Finish the run.
 
@@ -229,33 +273,47 @@ class RecorderNode(ParameterNode):
 
     def _look(self) -> None:
         """Follow the graph: topics and nodes that have appeared."""
-        if self._writer is not None and self._watch is not None:
-            self._watch.look(self._snapshots.want)
-            self._snapshots.look()
+        if self._watch is not None and (self._writer or self._snapshot is not None):
+            self._watch.look(self._parameters.want)
+            self._parameters.look()
 
     def _take(self) -> None:
         """Take what has arrived."""
-        if self._writer is not None and self._watch is not None:
-            self._stalls.note(time.monotonic())
-            self._watch.take()
+        if self._watch is None or (self._writer is None and self._snapshot is None):
+            return
+        step = self._clock_watch.look()
+        if step is not None:
+            for received in self._log.samples.values():
+                received.clock_stepped(round(step.seconds * 1e9))
+            (self._writer or self._snapshot).note(CLOCK, self._clock_watch.values())  # type: ignore[union-attr]
+            self.get_logger().warning(f'Noted: {step_sentence(step.seconds)}')
+        self._stalls.note(time.monotonic())
+        self._watch.take()
+        if self._snapshot is not None and len(self._log.flags) > self._flags:
+            raised = any(up for _, _, up in self._log.flags[self._flags :])
+            self._flags = len(self._log.flags)
+            if raised:
+                done, said = self.snapshot('Chatter was flagged.')
+                (self.get_logger().info if done else self.get_logger().error)(said)
 
     def _write(
         self, name: str, data: bytes, log_time: int, publish_time: int, number: int
     ) -> None:
         """Write a message as it came."""
-        if self._writer is not None:
-            self._writer.write(
-                name, data, log_time=log_time, publish_time=publish_time, sequence=number
-            )
-            kind = self._topics[name].topic.type
-            self._log.receive(name, kind, data, log_time, publish_time)
+        sink: Any = self._writer if self._snapshot is None else self._snapshot
+        if sink is None:
+            return
+        sink.write(name, data, log_time=log_time, publish_time=publish_time, sequence=number)
+        kind = self._topics[name].topic.type
+        self._log.receive(name, kind, data, log_time, publish_time)
 
     def _note_parameters(self, node: str, parameters: dict[str, Any]) -> None:
         """Keep what another node was asked for, and when it answered."""
-        if self._writer is not None:
+        sink = self._writer if self._snapshot is None else self._snapshot
+        if sink is not None:
             answers = self._noted.setdefault(node, [])
             answers.append((parameters, time.time_ns()))
-            self._writer.note(PARAMETERS + node, parameter_values(answers))
+            sink.note(PARAMETERS + node, parameter_values(answers))
 
     # -- what is done with it --------------------------------------------------------------
 
@@ -270,18 +328,27 @@ class RecorderNode(ParameterNode):
             return
         self._take()
         self._log_news()
+        left_out = sum(len(each.pauses) for each in self._log.samples.values())
+        if left_out != self._left_out:
+            self._left_out = left_out
+            self._writer.note(PAUSES, self._log.pause_values())
         try:
             self._writer.commit_soon()
         except (OSError, LatheChatterError) as error:
             self._fail(error)
 
-    def _log_news(self) -> None:
+    def _log_news(self, *, last: bool = False) -> None:
         """Say from when there are samples, and where they are missing."""
         for topic, received in self._log.samples.items():
             if any(each.order is BlockOrder.RESTART for each in received.discontinuities):
-                self._snapshots.want_again(topic.removesuffix('/samples'))
-        for sentence in news(self._log):
-            self.get_logger().info(sentence)
+                self._parameters.want_again(topic.removesuffix('/samples'))
+        now = time.monotonic()
+        if last or now > self._next_news:
+            sentences = [*news(self._log)]
+            # A place where samples are missing seldom comes alone.
+            self._next_news = now + (_NEWS_PERIOD if sentences else 0.0)
+            for sentence in sentences:
+                self.get_logger().info(sentence)
 
     def _fail(self, error: Exception) -> None:
         folder = self.run

@@ -1,11 +1,12 @@
-"""The services `~/start`, `~/stop` and `~/split` of the recorder."""
+"""The services of the recorder: `~/start`, `~/stop`, `~/split`, `~/snapshot` and `~/pause`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.control import Answer
@@ -14,7 +15,7 @@ from lathe_chatter.nodes.control import Answer
 class Recorder(Protocol):
     """What the services drive: these requests, on a node of rclpy."""
 
-    def start(self) -> Path:
+    def start(self) -> Path | None:
         """Begin a run; LatheChatterError where that cannot be."""
 
     def stop(self) -> Answer:
@@ -23,6 +24,12 @@ class Recorder(Protocol):
     def split(self) -> Answer:
         """Go on in a new file."""
 
+    def snapshot(self, reason: str) -> Answer:
+        """Write what is in memory."""
+
+    def pause(self, *, pause: bool) -> Answer:
+        """Leave out what comes, or no longer."""
+
     def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
         """Create a service."""
 
@@ -30,21 +37,31 @@ class Recorder(Protocol):
 def create_services(recorder: Recorder) -> None:
     """Create the services on a node."""
 
-    def start(_request: Any, response: Any) -> Any:
+    def start() -> Answer:
         try:
-            response.success, response.message = True, f'Recording into {recorder.start()}.'
+            folder = recorder.start()
         except LatheChatterError as error:
-            response.success, response.message = False, str(error)
+            return Answer(done=False, message=str(error))
+        said = 'Keeping the last in memory.' if folder is None else f'Recording into {folder}.'
+        return Answer(done=True, message=said)
+
+    def answering(act: Callable[[], Answer]) -> Callable[[Any, Any], Any]:
+        def answer(_request: Any, response: Any) -> Any:
+            response.success, response.message = act()
+            return response
+
+        return answer
+
+    def pause(request: Any, response: Any) -> Any:
+        response.success, response.message = recorder.pause(pause=request.data)
         return response
 
-    def stop(_request: Any, response: Any) -> Any:
-        response.success, response.message = recorder.stop()
-        return response
-
-    def split(_request: Any, response: Any) -> Any:
-        response.success, response.message = recorder.split()
-        return response
-
-    recorder.create_service(Trigger, '~/start', start)
-    recorder.create_service(Trigger, '~/stop', stop)
-    recorder.create_service(Trigger, '~/split', split)
+    requests = {
+        'start': start,
+        'stop': recorder.stop,
+        'split': recorder.split,
+        'snapshot': lambda: recorder.snapshot('It was asked for.'),
+    }
+    for name, act in requests.items():
+        recorder.create_service(Trigger, f'~/{name}', answering(act))
+    recorder.create_service(SetBool, '~/pause', pause)

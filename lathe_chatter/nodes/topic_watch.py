@@ -3,15 +3,89 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
 
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
-from rosbags.typesys import Stores, get_typestore
 
+from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.recorded_topic import RecordedTopic, Write, topic_of
-from lathe_chatter.recording import RunWriter
+from lathe_chatter.nodes.topic_types import MissingTypeError, message_type
+from lathe_chatter.recording import Topic
 from lathe_chatter.recording.provenance import PUBLISHERS
+
+ALWAYS = ('/rosout', '/parameter_events')
+"""Topics that are recorded in a pause as well: without them its end would be a riddle."""
+_DISCOVERY = 1.0
+"""s after the start of a recording: what is found by then may have been there before."""
+
+
+class Sink(Protocol):
+    """Where a recording goes: into a run, or into the memory of a snapshot."""
+
+    @property
+    def repeated(self) -> Counter[str]:
+        """Messages that a file begins with because one before had them, by name of topic."""
+
+    def add_topic(self, topic: Topic) -> None:
+        """Announce a topic."""
+
+    def note(self, name: str, values: dict[str, str]) -> None:
+        """Keep named values."""
+
+
+class Selection(NamedTuple):
+    """Which topics are recorded.
+
+    Attributes:
+        names: By their full names.
+        every: Whether all that there are.
+        like: Whose names match; None where none is.
+        unlike: Those whose names match are left out; None where none is.
+        repeat: Whether each file repeats the latest message of topics that are latched.
+    """
+
+    names: frozenset[str]
+    every: bool
+    like: re.Pattern[str] | None
+    unlike: re.Pattern[str] | None
+    repeat: bool
+
+    def among(self, there: Iterable[str]) -> Iterator[str]:
+        """The topics to record, of all that there are."""
+        for name in sorted({*self.names, *there}):
+            hidden = any(part.startswith('_') for part in name.split('/'))
+            chosen = name in self.names or (
+                not hidden and (self.every or (self.like and self.like.search(name)))
+            )
+            if chosen and not (self.unlike and self.unlike.search(name)):
+                yield name
+
+
+def selection(node: Node, values: dict[str, Any]) -> Selection:
+    """What the parameters of a recorder select.
+
+    Raises:
+        LatheChatterError: If an expression is none.
+    """
+    names = frozenset(node.resolve_topic_name(name) for name in values['topics'])
+    like, unlike = (_pattern(name, values[name]) for name in ('topics_like', 'exclude'))
+    repeat = values['repeat_latched'] or values['snapshot'] > 0.0
+    return Selection(names, values['all_topics'], like, unlike, repeat)
+
+
+def _pattern(name: str, text: str) -> re.Pattern[str] | None:
+    try:
+        return re.compile(text) if text else None
+    except re.error as error:
+        raise LatheChatterError(
+            f'{name} must be a regular expression, and {text!r} is none: {error}.'
+        ) from None
 
 
 class TopicWatch:
@@ -19,22 +93,26 @@ class TopicWatch:
 
     Args:
         node: Which subscribes.
-        wanted: Names of topics, as a user writes them.
-        writer: Of the run; it is told which topics there are, and how many publish them.
+        wanted: Which topics.
+        sink: Of the recording; it is told which topics there are, and how many publish them.
         write: Takes every message.
 
     Attributes:
         topics: Those that have appeared, by their full names.
+        refused: Types that are not installed, by the names of topics that are not recorded.
+        paused: Whether what comes is left out.
     """
 
-    def __init__(self, node: Node, wanted: Iterable[str], writer: RunWriter, write: Write) -> None:
+    def __init__(self, node: Node, wanted: Selection, sink: Sink, write: Write) -> None:
         """Begin with none found."""
         self.topics: dict[str, RecordedTopic] = {}
-        self._node, self._writer, self._write = node, writer, write
-        self._types = get_typestore(Stores.ROS2_JAZZY)
-        self._wanted = [node.resolve_topic_name(name) for name in wanted]
-        self._refused: set[str] = set()
+        self.refused: dict[str, str] = {}
+        self._node, self._sink, self._write = node, sink, write
+        self._wanted = wanted
+        self.paused = False
+        self._former: dict[str, dict[str, int]] = {}
         self._most_publishers: dict[str, int] = {}
+        self._since, self._began = time.time_ns(), time.monotonic()
 
     def look(self, on_publisher: Callable[[str, str], None]) -> None:
         """Subscribe to what has appeared, and follow the others.
@@ -42,25 +120,33 @@ class TopicWatch:
         Args:
             on_publisher: Takes namespace and name of every node that publishes a wanted topic.
         """
-        for name in self._wanted:
-            if name in self._refused:
-                continue
+        open_ended = self._wanted.every or self._wanted.like
+        there = self._node.get_topic_names_and_types() if open_ended else ()
+        for name in self._wanted.among(name for name, _ in there):
             offers = self._node.get_publishers_info_by_topic(name)
-            if name in self.topics:
-                self.topics[name].look(offers)
-            elif offers:
+            topic = self.topics.get(name)
+            if topic is not None and topic.is_of(offers):
+                topic.look([each for each in offers if each.topic_type == topic.topic.type])
+            elif offers and self.refused.get(name) != offers[0].topic_type:
                 self._join(name, offers)
             for offer in offers:
                 on_publisher(offer.node_namespace, offer.node_name)
             if len(offers) > self._most_publishers.get(name, 0):
                 self._most_publishers[name] = len(offers)
                 counts = {each: str(count) for each, count in self._most_publishers.items()}
-                self._writer.note(PUBLISHERS, counts)
+                self._sink.note(PUBLISHERS, counts)
 
     def take(self) -> None:
         """Take what has arrived."""
         for topic in self.topics.values():
             topic.take()
+
+    def pause(self, *, pause: bool) -> None:
+        """Leave out what comes, from now on, or no longer."""
+        self.take()
+        self.paused = pause
+        for name, topic in self.topics.items():
+            topic.paused = pause and name not in ALWAYS
 
     def end(self) -> None:
         """Take what has arrived, and unsubscribe."""
@@ -69,16 +155,49 @@ class TopicWatch:
 
     def reception(self) -> dict[str, str]:
         """What came of each topic, and what did not, as JSON."""
-        return {name: json.dumps(topic.reception()) for name, topic in self.topics.items()}
+        return {
+            name: json.dumps({**self._counted(topic), 'repeated': self._sink.repeated[name]})
+            for name, topic in self.topics.items()
+        }
+
+    def _counted(self, topic: RecordedTopic) -> dict[str, int]:
+        """What came of a topic, with what came of it under former types."""
+        former = self._former.get(topic.topic.name, {})
+        return {name: n + former.get(name, 0) for name, n in topic.reception().items()}
 
     def _join(self, name: str, offers: list[TopicEndpointInfo]) -> None:
-        """Record a topic from now on."""
-        topic = topic_of(name, offers, self._types)
-        if topic is None:
-            self._refused.add(name)
-            self._node.get_logger().warning(
-                f'{name} is not recorded: its type {offers[0].topic_type} is not known.'
-            )
+        """Record a topic from now on, or its new type."""
+        kind = offers[0].topic_type
+        offers = [offer for offer in offers if offer.topic_type == kind]
+        try:
+            found = message_type(offers[0])
+        except MissingTypeError as error:
+            self.refused[name] = kind
+            self._node.get_logger().warning(f'{name} is not recorded: {error}.')
             return
-        self._writer.add_topic(topic)
-        self.topics[name] = RecordedTopic(self._node, topic, offers, self._write)
+        topic = topic_of(name, found, offers)
+        if not self._wanted.repeat:
+            topic = replace(topic, repeated=0)
+        former = self.topics.get(name)
+        if former is not None:
+            former.end()
+            self._former[name] = self._counted(former)
+            self._node.get_logger().info(f'{name} is now of type {kind}, and recorded as such.')
+        try:
+            recorded = RecordedTopic(
+                self._node,
+                topic,
+                found.message_class,
+                offers,
+                self._write,
+                since=self._since,
+                may_be_older=time.monotonic() < self._began + _DISCOVERY,
+            )
+        except Exception as error:  # noqa: BLE001 -- of the middleware, about this topic alone
+            self.refused[name] = kind
+            said = ' '.join(str(error).split())
+            self._node.get_logger().warning(f'{name} is not recorded: {said}')
+            return
+        self._sink.add_topic(topic)
+        recorded.paused = self.paused and name not in ALWAYS
+        self.topics[name] = recorded

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lathe_chatter.recording.metadata import FILE_NAME
-from lathe_chatter.recording.provenance import IDENTITY, RECOVERED
+from lathe_chatter.recording.provenance import ENDED_EARLY, IDENTITY, RECOVERED
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_file import Note
 from lathe_chatter.recording.split_files import CLOSED
@@ -51,6 +51,8 @@ def check_end(found: Verification, notes: list[Note]) -> None:
         found.finished = False
         found.lose(text)
     for note in notes:
+        if note.name == ENDED_EARLY:
+            found.lose(f'The run ended early. {note.values.get("reason", "")}'.strip())
         if note.name == RECOVERED:
             lost = noted(note, 'damage') or ()
             said = f'This run was recovered from {note.values.get("from", "another")}.'

@@ -5,10 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
+from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
+from lathe_chatter.recording.provenance import (
+    ENDED_EARLY,
+    IDENTITY,
+    PARAMETERS,
+    identity,
+    parameter_values,
+)
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
     PARAMETER_EVENT_TYPE,
@@ -22,8 +30,8 @@ from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
-_COMMIT_PERIOD = 0.25
-"""s between two commits: what a kill can lose."""
+_COMMIT_PERIOD = 0.15
+"""s between two commits: with the time that one takes this is what a kill can lose."""
 _SECOND = 10**9
 
 
@@ -64,6 +72,7 @@ class LatheRun:
         self._sequences: dict[str, int] = {}
         self._committed = time.monotonic()
         self._closed = False
+        self._clock = ClockWatch()
         self._log, self._parameters = RunLog(), dict(parameters)
         self._kinds: dict[str, str] = {}
         self.writer.note(IDENTITY, identity())
@@ -109,10 +118,16 @@ class LatheRun:
             OSError: If it refused.
         """
         self._committed = time.monotonic()
-        self.writer.commit_soon()
+        if not self._simulated and self._clock.look():
+            self.writer.note(CLOCK, self._clock.values())
+        # Of a simulation no data may pile up that is not on disk: it waits for the disk.
+        (self.writer.commit if self._simulated else self.writer.commit_soon)()
 
-    def close(self) -> None:
+    def close(self, ended_early: str = '') -> None:
         """Finish the run, with its summary; a second time does nothing.
+
+        Args:
+            ended_early: Why it has not all that it was to have, a sentence; else empty.
 
         Raises:
             OSError: If the disk refuses.
@@ -120,6 +135,8 @@ class LatheRun:
         if self._closed:
             return
         self._closed = True
+        if ended_early:
+            self.writer.note(ENDED_EARLY, {'reason': ended_early})
         summary = closing_summary(self._log, {self.name: [(self._parameters, self._begun)]})
         self.writer.note(SUMMARY, summary)
         self.writer.close()
@@ -133,9 +150,18 @@ class LatheRun:
         """It is there."""
         return self
 
-    def __exit__(self, *_error: object) -> None:
-        """Close, also after an exception."""
-        self.close()
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close; after an exception the run says that it ended early."""
+        if error is None:
+            self.close()
+            return
+        interrupted = isinstance(error, KeyboardInterrupt)
+        self.close('It was interrupted.' if interrupted else f'It failed: {error}')
 
     def _announce(self, topic: str, kind: str) -> None:
         self.writer.add_topic(topic_of_type(topic, kind))

@@ -4,8 +4,11 @@ MCAP ends in a summary (index, statistics) and a footer; a file without them ope
 reader. A commit therefore writes the new chunk *and* a fresh summary and footer in one call, over
 the summary that the commit before it left. The new bytes are always more than those they
 replace, so there is no moment between calls at which the file lacks an end: kill -9 loses what
-came since the last commit and nothing else. (Should it strike inside the call itself, some tens
-of microseconds in every 0.25 s, the file has no end, and `recover` has every chunk.)
+came since the last commit and nothing else.
+
+A large commit takes milliseconds, in the middle of which a kill may strike: the system leaves off
+between two pages. So the end of the commit before is first copied to where it is in nobody's
+way, beyond the new bytes; the file is cut off behind these when they are all there.
 
 The package mcap has a writer, but one that makes every summary from nothing, which takes 31 ms
 after half an hour of four commits a second. Here a commit adds to the summary's bytes what is
@@ -17,26 +20,19 @@ from __future__ import annotations
 import contextlib
 import os
 import struct
-from array import array
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import lz4.frame
-import numpy as np
 from isal.isal_zlib import crc32
-from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
-    Chunk,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
-    McapRecord,
     Metadata,
     MetadataIndex,
     Statistics,
@@ -44,126 +40,13 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.disk_thread import FileSync
+from lathe_chatter.recording.mcap_chunk import ClosedChunk, Compression, OpenChunk, record_bytes
 from lathe_chatter.recording.provenance import sealed
 
-MESSAGE_HEAD = struct.Struct('<BQHIQQ')
-"""Opcode, length, channel, sequence, log time, publish time; the message follows."""
-_HEAD_IN_LENGTH = MESSAGE_HEAD.size - 9  # a length does not count opcode and itself
-_INDEX_HEAD = struct.Struct('<BQHI')
-
-
-def record_bytes(record: McapRecord) -> bytes:
-    """A record as it stands in a file."""
-    builder = RecordBuilder()
-    record.write(builder)
-    data: bytes = builder.end()
-    return data
-
-
-@dataclass(frozen=True)
-class ClosedChunk:
-    """A chunk with its message indexes, ready for a file.
-
-    Attributes:
-        data: The bytes.
-        index: What the summary of the file says about it, as bytes.
-        first: Earliest log time, ns.
-        last: Latest log time, ns.
-        counts: Messages by channel.
-    """
-
-    data: bytes
-    index: bytes
-    first: int
-    last: int
-    counts: dict[int, int]
-
-
-class OpenChunk:
-    """Collects messages, and what their channels are: any chunk can be read by itself.
-
-    A message costs a packed head and two appends: this is the path that each one takes.
-
-    Args:
-        channels: The records of each channel and its schema, by number.
-    """
-
-    def __init__(self, channels: Mapping[int, bytes]) -> None:
-        """Begin empty."""
-        self._channels = channels
-        self._records = bytearray()
-        self._indexes: dict[int, array[int]] = {}
-
-    @property
-    def size(self) -> int:
-        """Bytes so far, before compression."""
-        return len(self._records)
-
-    @property
-    def has_messages(self) -> bool:
-        """Whether there is anything to close for."""
-        return bool(self._indexes)
-
-    def add_message(
-        self, channel: int, log_time: int, publish_time: int, sequence: int, data: bytes
-    ) -> None:
-        """Add a message to a channel."""
-        index = self._indexes.get(channel)
-        if index is None:
-            index = self._indexes[channel] = array('Q')
-            self._records += self._channels[channel]
-        records = self._records
-        index.append(log_time)
-        index.append(len(records))
-        records += MESSAGE_HEAD.pack(
-            Opcode.MESSAGE,
-            _HEAD_IN_LENGTH + len(data),
-            channel,
-            sequence & 0xFFFFFFFF,
-            log_time,
-            publish_time,
-        )
-        records += data
-
-    def close(self, offset: int) -> ClosedChunk:
-        """The chunk as it stands at an offset of its file. It holds at least one message."""
-        times = [np.frombuffer(index, np.uint64)[::2] for index in self._indexes.values()]
-        first = int(min(each.min() for each in times))
-        last = int(max(each.max() for each in times))
-        compressed = lz4.frame.compress(self._records)
-        chunk = record_bytes(
-            Chunk(
-                compression='lz4',
-                data=compressed,
-                message_start_time=first,
-                message_end_time=last,
-                uncompressed_crc=crc32(self._records),
-                uncompressed_size=len(self._records),
-            )
-        )
-        parts = [chunk]
-        offsets: dict[int, int] = {}
-        end = offset + len(chunk)
-        for channel, index in self._indexes.items():
-            size = len(index) * index.itemsize
-            head = _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + size, channel, size)
-            # MCAP is little-endian, and so is every machine that ROS 2 supports.
-            parts += [head, index.tobytes()]
-            offsets[channel] = end
-            end += len(head) + size
-        entry = ChunkIndex(
-            chunk_start_offset=offset,
-            chunk_length=len(chunk),
-            message_start_time=first,
-            message_end_time=last,
-            message_index_offsets=offsets,
-            message_index_length=end - offset - len(chunk),
-            compression='lz4',
-            compressed_size=len(compressed),
-            uncompressed_size=len(self._records),
-        )
-        counts = {channel: len(index) // 2 for channel, index in self._indexes.items()}
-        return ClosedChunk(b''.join(parts), record_bytes(entry), first, last, counts)
+_DATA_END_SIZE, _END_SIZE = 13, 37
+"""Bytes of the record that ends the data, and of footer and magic."""
+_AT_ONCE = 1 << 17
+"""Bytes that are written within some tens of microseconds."""
 
 
 @dataclass
@@ -193,10 +76,11 @@ class Contents:
 
 
 class CommittedFile:
-    """Writes one MCAP file, chunked, with lz4 and CRCs, by commits.
+    """Writes one MCAP file, chunked, with CRCs, by commits.
 
     Args:
         path: Of the file, which must not exist.
+        compression: Of its chunks.
 
     Attributes:
         committed: What the file on disk holds.
@@ -205,8 +89,9 @@ class CommittedFile:
         OSError: If the file cannot be made.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, compression: Compression = Compression.LZ4) -> None:
         """Make the file and commit its empty beginning."""
+        self._compression = compression
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
         self._sync = FileSync(self._descriptor)
         self._schemas: list[bytes] = []
@@ -239,7 +124,7 @@ class CommittedFile:
 
     def add_chunk(self, chunk: OpenChunk) -> None:
         """Add a chunk of messages."""
-        closed = chunk.close(self._end)
+        closed = chunk.close(self._end, self._compression)
         self._body += closed.data
         self._chunk_indexes += closed.index
         self._contents = self._contents.with_chunk(closed)
@@ -284,7 +169,7 @@ class CommittedFile:
         crc = crc32(self._body, self._crc)
         tail = self._summary(crc)
         try:
-            _write_at(self._descriptor, b''.join((self._body, tail)), self._body_start)
+            self._write(b''.join((self._body, tail)))
         except OSError:
             self._restore()
             raise
@@ -346,18 +231,40 @@ class CommittedFile:
                 self._other_indexes,
             )
         )
-        start = self._end + len(data_end)
-        # The CRC of a summary covers the footer up to the CRC itself.
-        beginning = struct.pack('<BQQQ', Opcode.FOOTER, 20, start, 0)
-        summary_crc = crc32(beginning, crc32(summary))
-        footer = Footer(summary_start=start, summary_offset_start=0, summary_crc=summary_crc)
-        return b''.join((data_end, summary, record_bytes(footer), MCAP0_MAGIC))
+        return b''.join((data_end, summary, _end_after(summary, self._end + len(data_end))))
+
+    def _write(self, data: bytes) -> None:
+        """Write over the end of the last commit, so that the file has an end all the while."""
+        start, end = self._body_start, self._body_start + len(data)
+        if len(data) < _AT_ONCE or not self._tail:
+            _write_at(self._descriptor, data, start)
+            return
+        summary = self._tail[_DATA_END_SIZE:-_END_SIZE]
+        # A few bytes at the far end, which point to the old summary; then a copy of it there.
+        borrowed = _end_after(b'', start + _DATA_END_SIZE, proven=False)
+        _write_at(self._descriptor, borrowed, end + len(summary))
+        _write_at(self._descriptor, summary, end)
+        _write_at(self._descriptor, _end_after(summary, end), end + len(summary))
+        # Who walks through the file meets the old end of the data until all else is there.
+        _write_at(self._descriptor, data[_DATA_END_SIZE:], start + _DATA_END_SIZE)
+        _write_at(self._descriptor, data[:_DATA_END_SIZE], start)
+        os.ftruncate(self._descriptor, end)
 
     def _restore(self) -> None:
         """Put the end of the last commit back, where a failed one has begun to overwrite it."""
         with contextlib.suppress(OSError):
             _write_at(self._descriptor, self._tail, self._body_start)
             os.ftruncate(self._descriptor, self._body_start + len(self._tail))
+
+
+def _end_after(summary: bytes, start: int, *, proven: bool = True) -> bytes:
+    """Footer and magic after a summary that starts at some byte of the file."""
+    # The CRC of a summary covers the footer up to the CRC itself.
+    beginning = struct.pack('<BQQQ', Opcode.FOOTER, 20, start, 0)
+    crc = crc32(beginning, crc32(summary)) if proven else 0
+    footer = Footer(summary_start=start, summary_offset_start=0, summary_crc=crc)
+    end: bytes = record_bytes(footer) + MCAP0_MAGIC
+    return end
 
 
 def _write_at(descriptor: int, data: bytes, offset: int) -> None:

@@ -28,6 +28,8 @@ class Topic:
         type_hash: RIHS01.
         qos: The profiles that its publishers offer, as rosbag2 writes them.
         encoding: Of its messages.
+        repeated: How many of its latest messages each later file of a run begins with: such as
+            a late reader would get from its publisher.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Topic:
     type_hash: str
     qos: tuple[Mapping[str, Any], ...] = ()
     encoding: str = 'cdr'
+    repeated: int = 0
 
 
 class FileCount(NamedTuple):

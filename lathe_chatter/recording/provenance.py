@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import platform
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
@@ -34,6 +35,13 @@ PUBLISHERS = 'lathe_chatter/publishers'
 
 STALLS = 'stalls'
 """Among these, how often the recorder took too long to take what had come."""
+
+PAUSES = 'lathe_chatter/pauses'
+"""Name of the record of what the recorder left out in pauses, as JSON: by topic of samples the
+simulated times before and after each, and in `clock` when each began and ended, ns."""
+
+ENDED_EARLY = 'lathe_chatter/ended_early'
+"""Name of the record of a run whose writer was stopped before it had all: `reason`, a sentence."""
 
 CHECK = 'check'
 """Name of the value in each record that tells whether the others are as they were written: no CRC
@@ -108,6 +116,23 @@ def noted_number(text: str, name: str = '') -> int:
         return int(found[name] if name else found)
     except (ValueError, TypeError, KeyError):
         return 0
+
+
+def noted_pauses(notes: Iterable[Any], name: str) -> list[tuple[float, float]]:
+    """What the recorder left out in pauses, from and to; see `PAUSES`.
+
+    Args:
+        notes: Of a run, each with name and values.
+        name: A topic of samples, or `clock`.
+    """
+    found: list[tuple[float, float]] = []
+    for note in notes:
+        if note.name == PAUSES and name in note.values:
+            try:
+                found = [(begin, end or math.inf) for begin, end in json.loads(note.values[name])]
+            except (ValueError, TypeError):
+                found = []
+    return found
 
 
 def parameter_values(answers: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.completeness import lost_at_the_end
+from lathe_chatter.recording.mcap_chunk import OpenChunk, record_bytes
 from lathe_chatter.recording.mcap_reader import Damage
-from lathe_chatter.recording.mcap_writer import OpenChunk, record_bytes
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.provenance import RECOVERED
 from lathe_chatter.recording.run import Run, read_run

@@ -6,6 +6,7 @@ as they came.
 
 from __future__ import annotations
 
+import json
 from bisect import bisect_left
 from collections import Counter, deque
 from dataclasses import dataclass, field
@@ -58,6 +59,7 @@ class SamplesReceived:
         head: Samples that the lathe took before the first one that came.
         silences: How often it published nothing for much longer than usual.
         longest: The longest time from one block to the next, s.
+        pauses: Simulated times before and after what the recorder left out in pauses, s.
         complaint: What is wrong with the layout of a message; empty where all is well.
         discontinuities: The latest places where samples are missing or begin, until they are
             logged.
@@ -68,12 +70,14 @@ class SamplesReceived:
     head: int = 0
     silences: int = 0
     longest: float = 0.0
+    pauses: list[tuple[float, float]] = field(default_factory=list)
     complaint: str = ''
     discontinuities: deque[Discontinuity] = field(
         default_factory=lambda: deque(maxlen=_MAX_DISCONTINUITIES)
     )
     _decoder: SampleDecoder = field(default_factory=SampleDecoder)
     _published: int = 0
+    _paused: bool = False
     _usual: float = 0.0
     _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_MAX_BLOCKS))
 
@@ -98,6 +102,13 @@ class SamplesReceived:
         """Join a block by its times (n,), s."""
         before, lost = self.continuity.last, self.continuity.lost
         order = self.continuity.join(times)
+        if self._paused:
+            self._paused = False
+            if order is BlockOrder.GAP and before is not None:  # it was left out, and not lost
+                self.pauses.append((before, float(times[0])))
+                self.continuity.lost = lost
+                self.continuity.gaps -= 1
+                return
         if order is BlockOrder.CONTIGUOUS:
             return
         first, missing = float(times[0]), self.continuity.lost - lost
@@ -107,6 +118,15 @@ class SamplesReceived:
         if order is BlockOrder.FIRST:
             self.first, self.head = first, missing
         self.discontinuities.append(Discontinuity(order, before, first, missing))
+
+    def pause(self) -> None:
+        """Blocks are left out from now on."""
+        self._paused, self._published = True, 0
+
+    def clock_stepped(self, step: int) -> None:
+        """The clock that dates blocks was set, by so many ns."""
+        self._published += step if self._published else 0
+        self._came.clear()
 
     def time_at(self, log_time: int) -> float:
         """Simulated time when another message was received, s: that of the block about then."""
@@ -140,12 +160,14 @@ class RunLog:
         samples: By name of topic.
         flags: Simulated time, topic and truth of each change of a monitor's flag.
         cut_logs: What each logger said of a cut.
+        pauses: When what came was left out, from and to, ns since the epoch; 0: until now.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
     samples: dict[str, SamplesReceived] = field(default_factory=dict)
     flags: list[tuple[float, str, bool]] = field(default_factory=list)
     cut_logs: dict[str, CutLog] = field(default_factory=dict)
+    pauses: list[list[int]] = field(default_factory=list)
     _flag: dict[str, bool] = field(default_factory=dict)
 
     def receive(
@@ -159,6 +181,21 @@ class RunLog:
             self._receive_flag(topic, bool(data[_FLAG_BYTE]), log_time)
         elif kind == LOG_TYPE:
             self._receive_log(data, publish_time)
+
+    def pause(self, now: int) -> None:
+        """What comes is left out from now on, ns since the epoch."""
+        self.pauses.append([now, 0])
+        for received in self.samples.values():
+            received.pause()
+
+    def resume(self, now: int) -> None:
+        """What comes is taken again."""
+        self.pauses[-1][1] = now
+
+    def pause_values(self) -> dict[str, str]:
+        """The pauses as the values of a record, as far as samples have come since."""
+        places = {name: json.dumps(each.pauses) for name, each in self.samples.items()}
+        return {'clock': json.dumps(self.pauses), **places}
 
     def _receive_flag(self, topic: str, up: bool, log_time: int) -> None:  # noqa: FBT001 -- it is one
         if up != self._flag.get(topic, False):

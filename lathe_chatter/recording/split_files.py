@@ -6,7 +6,7 @@ import contextlib
 import json
 import shutil
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +15,8 @@ from mcap.records import Channel, Schema
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.recording.disk_thread import FileSync
-from lathe_chatter.recording.mcap_writer import CommittedFile, Contents, OpenChunk, record_bytes
+from lathe_chatter.recording.mcap_chunk import Compression, OpenChunk, record_bytes
+from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
 from lathe_chatter.recording.metadata import (
     FileCount,
     Topic,
@@ -60,18 +61,24 @@ class TopicRecords(NamedTuple):
         topic: Which.
         schema: Of its type; empty where a topic before has the same.
         channel: The channel.
+        described: Both, as a chunk has them.
     """
 
     topic: Topic
     schema: bytes
     channel: bytes
+    described: bytes = b''
+
+
+_Kind = tuple[str, str, str]
+"""Name, hash and definition of a type."""
 
 
 class TopicTable:
     """Gives topics their numbers.
 
     Attributes:
-        numbers: Of the channels, by name of topic.
+        numbers: Of the latest channel, by name of topic: each type of a topic has its own.
         described: Schema and channel as a chunk has them, by number of the channel.
     """
 
@@ -79,20 +86,23 @@ class TopicTable:
         """Begin empty."""
         self.numbers: dict[str, int] = {}
         self.described: dict[int, bytes] = {}
-        self._schemas: dict[str, tuple[int, bytes]] = {}
+        self._schemas: dict[_Kind, tuple[int, bytes]] = {}
+        self._kinds: dict[str, _Kind] = {}
 
     def add(self, topic: Topic) -> TopicRecords | None:
-        """The records of a topic that is new; None for one that is known."""
-        if topic.name in self.numbers:
+        """The records of a topic that is new, or of a new type; None for one that is known."""
+        kind = topic.type, topic.type_hash, topic.definition
+        if self._kinds.get(topic.name) == kind:
             return None
-        known = topic.type in self._schemas
+        self._kinds[topic.name] = kind
+        known = kind in self._schemas
         if not known:
             number = len(self._schemas) + 1
             data = topic.definition.encode()
             schema = Schema(id=number, name=topic.type, encoding='ros2msg', data=data)
-            self._schemas[topic.type] = number, record_bytes(schema)
-        schema_number, schema_record = self._schemas[topic.type]
-        number = len(self.numbers) + 1
+            self._schemas[kind] = number, record_bytes(schema)
+        schema_number, schema_record = self._schemas[kind]
+        number = len(self.described) + 1
         channel = record_bytes(
             Channel(
                 id=number,
@@ -107,7 +117,8 @@ class TopicTable:
         )
         self.described[number] = schema_record + channel
         self.numbers[topic.name] = number
-        return TopicRecords(topic, b'' if known else schema_record, channel)
+        described = self.described[number]
+        return TopicRecords(topic, b'' if known else schema_record, channel, described)
 
 
 class _FinishedFile(NamedTuple):
@@ -127,13 +138,17 @@ class RunFiles:
         min_free_space: Bytes that the disk must keep.
         split_duration: s of recording in one file before the next is begun.
         split_size: Bytes, likewise.
+        compression: Of the chunks.
+
+    Attributes:
+        repeated: Messages that files begin with because those before had them, by topic.
 
     Raises:
         RunExistsError: If the folder exists.
         OSError: If it cannot be made or written.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 -- what a user may choose of a recording
         self,
         folder: Path,
         distribution: str,
@@ -141,6 +156,7 @@ class RunFiles:
         min_free_space: int,
         split_duration: float,
         split_size: float,
+        compression: Compression = Compression.LZ4,
     ) -> None:
         """Make the folder with a first, empty file and its metadata."""
         self._folder = folder
@@ -148,6 +164,9 @@ class RunFiles:
         self._min_free_space = min_free_space
         self._split_duration = split_duration
         self._split_size = split_size
+        self._compression = compression
+        self.repeated: Counter[str] = Counter()
+        self._kept: dict[int, deque[tuple[int, bytes]]] = {}
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -166,6 +185,9 @@ class RunFiles:
 
     def add_chunk(self, chunk: OpenChunk) -> None:
         """Add the messages of a chunk."""
+        for channel, published, data in chunk.kept:
+            most = self._topics[channel - 1].topic.repeated
+            self._kept.setdefault(channel, deque(maxlen=most)).append((published, data))
         self._file.add_chunk(chunk)
 
     def note(self, name: str, values: Mapping[str, str]) -> None:
@@ -203,7 +225,22 @@ class RunFiles:
             OSError: If the disk refuses.
         """
         self._end_file(self._name(len(self._finished) + 1))
+        last = self._finished[-1].contents.last
         self._open_file()
+        self._repeat(last)
+
+    def _repeat(self, received: int) -> None:
+        """Begin a file with what a late reader would get; dated by the end of the last one, ns."""
+        numbers = range(1, len(self._topics) + 1)
+        described = {k: self._topics[k - 1].described for k in numbers if k in self._kept}
+        chunk = OpenChunk(described)
+        for channel, messages in self._kept.items():
+            self.repeated[self._topics[channel - 1].topic.name] += len(messages)
+            for published, data in messages:
+                # Its number was given to the first copy, and is no number of this one.
+                chunk.add_message(channel, received, published, 0, data)
+        if chunk.has_messages:
+            self._file.add_chunk(chunk)
 
     def close(self) -> None:
         """Finish the files and the metadata.
@@ -252,7 +289,8 @@ class RunFiles:
 
     def _open_file(self) -> None:
         """Begin a file, with all that is known, and say so in the metadata."""
-        self._file = CommittedFile(self._folder / self._name(len(self._finished)))
+        path = self._folder / self._name(len(self._finished))
+        self._file = CommittedFile(path, self._compression)
         self._begun = len(self._finished) + 1
         # In the same order, so with the same numbers in every file.
         for records in self._topics:

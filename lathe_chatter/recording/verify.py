@@ -20,7 +20,12 @@ from lathe_chatter.recording.completeness import (
     noted,
 )
 from lathe_chatter.recording.metadata_check import check_metadata
-from lathe_chatter.recording.provenance import PUBLISHERS, RECEPTION, STALLS
+from lathe_chatter.recording.provenance import (
+    PUBLISHERS,
+    RECEPTION,
+    STALLS,
+    noted_pauses,
+)
 from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.run_file import Note, offers_of
 from lathe_chatter.recording.sequence_gaps import Numbering
@@ -113,10 +118,16 @@ def _tell_numbering(
     found: Verification, topic: str, numbering: Numbering, publishers: int
 ) -> None:
     """Say what the numbers of a topic say is missing."""
-    losses = numbering.losses
+    pauses = [(begin / 1e9, end / 1e9) for begin, end in noted_pauses(found.run.notes(), 'clock')]
+    losses = [
+        loss
+        for loss in numbering.losses
+        if not any(begin <= loss.until and loss.since <= end for begin, end in pauses)
+    ]
+    missing = sum(loss.messages for loss in losses)
     if len(losses) > _MANY:
         found.lose(
-            f'{topic}: {numbering.lost} messages are missing in {len(losses)} places between '
+            f'{topic}: {missing} messages are missing in {len(losses)} places between '
             f'{_clock(losses[0].since)} and {_clock(losses[-1].until)}, '
             f'{max(loss.messages for loss in losses)} of them in one.'
         )
@@ -180,7 +191,15 @@ def _check_samples(found: Verification, progress: Progress) -> None:
 
 def _tell_breaks(found: Verification, topic: str, continuity: Continuity) -> None:
     """Say where samples do not follow those before: where there are many places, in short."""
+    pauses = noted_pauses(found.run.notes(), topic)
     gaps, restarts = continuity.gap_places, continuity.restart_places
+    if pauses:
+        left_out = [gap for gap in gaps if gap in pauses]
+        gaps = [gap for gap in gaps if gap not in pauses]
+        found.remark(
+            f'{topic}: {sum(after - before for before, after in left_out):.6f} s of simulated '
+            f'time were left out in {len(left_out)} pauses of the recorder.'
+        )
     if len(gaps) > _MANY:
         longest = max(gaps, key=lambda gap: gap[1] - gap[0])
         found.lose(
@@ -227,7 +246,7 @@ def _check_reception(
             lost, there = heard.get('lost', 0), found.messages[topic]
             if lost > numberings.get(topic, Numbering()).lost:
                 found.lose(f'{topic}: the recorder missed {lost} messages on the way to it.')
-            if heard.get('messages', there) != there:
+            if heard.get('messages', there) + heard.get('repeated', 0) != there:
                 found.lose(
                     f'{topic}: {heard["messages"]} messages were recorded, and {there} are there.'
                 )

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 
 from lathe_chatter.recording.disk_thread import DiskThread
-from lathe_chatter.recording.mcap_writer import OpenChunk
+from lathe_chatter.recording.mcap_chunk import Compression, OpenChunk
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.split_files import (
     CLOSED,
@@ -41,13 +41,14 @@ class RunWriter:
         min_free_space: Bytes that the disk must keep.
         split_duration: s of recording in one file before the next is begun.
         split_size: Bytes, likewise.
+        compression: Of the chunks.
 
     Raises:
         RunExistsError: If the folder exists.
         OSError: If it cannot be made or written.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 -- what a user may choose of a recording
         self,
         folder: Path,
         *,
@@ -55,6 +56,7 @@ class RunWriter:
         min_free_space: int = 0,
         split_duration: float = math.inf,
         split_size: float = math.inf,
+        compression: Compression = Compression.LZ4,
     ) -> None:
         """Make the folder with a first, empty file and its metadata."""
         self.folder = folder
@@ -64,17 +66,23 @@ class RunWriter:
             min_free_space=min_free_space,
             split_duration=split_duration,
             split_size=split_size,
+            compression=compression,
         )
         self._counts = UnfinishedCounts(folder)
         self._topics = TopicTable()
         self._chunk = OpenChunk(self._topics.described)
+        self._repeated: dict[int, int] = {}
         self._closed = False
         self._thread = DiskThread('run writer')
 
     def add_topic(self, topic: Topic) -> None:
-        """Announce a topic before its first message; a second time changes nothing."""
+        """Announce a topic before its first message; a second time changes nothing.
+
+        With another type it goes on in another channel.
+        """
         records = self._topics.add(topic)
         if records is not None:
+            self._repeated[self._topics.numbers[topic.name]] = topic.repeated
             self._thread.do_later(lambda: self._files.add_topic(records))
 
     def write(
@@ -92,6 +100,8 @@ class RunWriter:
         chunk, channel = self._chunk, self._topics.numbers[name]
         chunk.add_message(channel, log_time, publish_time, sequence, data)
         self._counts.count(channel, log_time)
+        if self._repeated[channel]:
+            chunk.kept.append((channel, publish_time, data))
         if chunk.size > _CHUNK_SIZE:
             self._send_chunk()
 
@@ -197,6 +207,11 @@ class RunWriter:
     def counts(self) -> Counter[str]:
         """Messages on disk by name of topic."""
         return self._files.counts
+
+    @property
+    def repeated(self) -> Counter[str]:
+        """Messages that a file begins with because one before had them, by name of topic."""
+        return self._files.repeated
 
     @property
     def safe_messages(self) -> int:

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import islice
@@ -79,6 +80,8 @@ def test_a_loss_on_the_way_is_counted(
     start: Start, bench: Bench, spin_until: Any, tmp_path: Path
 ) -> None:
     recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
+    began = time.monotonic()  # what is found at once may be older than the recording
+    spin_until(lambda: time.monotonic() > began + 1.1, 'the end of the discovery')
     # Keeps one message only: all but the last are gone before the recorder finds the topic.
     publisher = bench.node.create_publisher(
         Float64, '/n', QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -11,7 +11,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.cut_events import BEGINNING, BEGINNING_AGAIN, change_sentence
 from lathe_chatter.model import Cut
 from lathe_chatter.model.parameters import parameters_of
-from lathe_chatter.recording import RunWriter, read_run, resimulate
+from lathe_chatter.recording import LatheRun, RunWriter, read_run, resimulate, verify
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
 from lathe_chatter.recording.provenance import (
     IDENTITY,
@@ -347,3 +347,23 @@ def test_a_late_reader_gets_the_log_from_before_a_step_of_the_clock(tmp_path: Pa
     record.writer.close()
     assert len(cuts_of(tmp_path / 'run').log.sessions) == 1
     assert said(tmp_path / 'run')[1:] == (False, False)
+
+
+def test_a_run_that_was_stopped_says_so(tmp_path: Path) -> None:
+    def stopped_by(error: BaseException, folder: Path) -> None:
+        with LatheRun(folder, parameters_of(lathe), simulated=True) as run:
+            run.log(BEGINNING)
+            run.write(lathe.advance(100))
+            raise error
+
+    lathe = VirtualLathe()
+    with pytest.raises(ValueError, match='what'):
+        stopped_by(ValueError('what'), tmp_path / 'failed')
+    with pytest.raises(KeyboardInterrupt):
+        stopped_by(KeyboardInterrupt(), tmp_path / 'interrupted')
+    said = {name: verify(tmp_path / name) for name in ('failed', 'interrupted')}
+    assert not any(found.complete for found in said.values())
+    assert [found.findings[-1].text for found in said.values()] == [
+        'The run ended early. It failed: what',
+        'The run ended early. It was interrupted.',
+    ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,8 @@ from support.recorded import (
     values_by_rosbags,
 )
 
-from lathe_chatter.recording import RunWriter, Topic
+from lathe_chatter.recording import RunWriter, Topic, read_run, verify
+from lathe_chatter.recording.mcap_chunk import Compression
 from lathe_chatter.recording.writer import DiskFullError, RunExistsError
 
 START = 1_700_000_000_000_000_000
@@ -159,3 +161,62 @@ def test_a_killed_writer_leaves_a_file_that_opens(commits: int, tmp_path: Path) 
     assert found == [float(k) for k in range(len(found))]
     assert len(found) >= said[-1]
     assert values_by_mcap(folder / 'run_0.mcap') == found
+
+
+@pytest.mark.parametrize('compression', [*Compression])
+def test_every_compression_is_read_back(
+    compression: Compression, tmp_path: Path, numbers: Topic
+) -> None:
+    with RunWriter(tmp_path / 'run', compression=compression) as writer:
+        writer.add_topic(numbers)
+        fill(writer, 0, 100)
+    expected = [float(k) for k in range(100)]
+    assert values_by_rosbags(tmp_path / 'run') == expected
+    assert values_by_mcap(tmp_path / 'run' / 'run_0.mcap') == expected
+    with (tmp_path / 'run' / 'run_0.mcap').open('rb') as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    name = '' if compression is Compression.NONE else compression.value
+    assert {index.compression for index in summary.chunk_indexes} == {name}
+    assert verify(tmp_path / 'run').complete
+
+
+def test_a_type_that_changes_goes_on_in_a_channel_of_its_own(tmp_path: Path) -> None:
+    flag = bytes(STORE.serialize_cdr(STORE.types[BOOL](data=True), BOOL))
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.add_topic(topic('/x'))
+        writer.write('/x', number(1.0), log_time=START, publish_time=START, sequence=1)
+        writer.add_topic(topic('/x', BOOL))
+        writer.write('/x', flag, log_time=START + 1, publish_time=START + 1, sequence=1)
+        writer.split()
+        writer.add_topic(topic('/x'))
+        writer.write('/x', number(2.0), log_time=START + 2, publish_time=START + 2, sequence=2)
+    found = [(raw.type, raw.data) for raw in read_run(tmp_path / 'run').raw_messages()]
+    assert found == [(NUMBER, number(1.0)), (BOOL, flag), (NUMBER, number(2.0))]
+    assert verify(tmp_path / 'run').complete
+
+
+def test_files_after_a_split_begin_with_what_a_late_reader_would_get(tmp_path: Path) -> None:
+    folder = tmp_path / 'run'
+    with RunWriter(folder) as writer:
+        writer.add_topic(replace(topic('/map'), repeated=2))
+        writer.add_topic(topic('/numbers'))
+        for k in range(3):
+            stamp = START + k
+            writer.write(
+                '/map', number(10.0 * k), log_time=stamp, publish_time=stamp, sequence=k + 1
+            )
+        fill(writer, 0, 2)
+        for _ in range(2):
+            writer.split()
+        fill(writer, 2, 4)
+        repeated = dict(writer.repeated)
+    assert repeated == {'/map': 4}
+    for name in ('run_1.mcap', 'run_2.mcap'):
+        with (folder / name).open('rb') as stream:
+            found = [
+                (channel.topic, STORE.deserialize_cdr(message.data, NUMBER).data)
+                for _, channel, message in make_reader(stream).iter_messages()
+            ]
+        assert found[:2] == [('/map', 10.0), ('/map', 20.0)]
+    assert verify(folder).complete

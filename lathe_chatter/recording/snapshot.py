@@ -1,0 +1,121 @@
+"""The last seconds of a run in memory, which are written when somebody wants them: a black box."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lathe_chatter.recording.metadata import Topic
+from lathe_chatter.recording.run_log import RunLog
+from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.recording.writer import RunWriter
+
+SNAPSHOT = 'lathe_chatter/snapshot'
+"""Name of the record of a run that is the end of a longer one: `seconds`, and `reason`."""
+
+
+class _Message(NamedTuple):
+    taken: float
+    topic: Topic
+    data: bytes
+    log_time: int
+    publish_time: int
+    sequence: int
+
+
+class SnapshotBuffer:
+    """Takes what a `RunWriter` takes and keeps the last of it, until `save` makes a run of it.
+
+    Args:
+        seconds: How long messages are kept. What a late reader would get from a publisher is
+            kept longer.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        """Begin empty."""
+        self.seconds = seconds
+        self.repeated: Counter[str] = Counter()
+        self._topics: dict[str, Topic] = {}
+        self._messages: deque[_Message] = deque()
+        self._kept: dict[str, deque[_Message]] = {}
+        self._notes: dict[str, dict[str, str]] = {}
+        self._files: list[Path] = []
+
+    def __len__(self) -> int:
+        """How many messages there are."""
+        return len(self._messages)
+
+    def add_topic(self, topic: Topic) -> None:
+        """Announce a topic before its first message."""
+        self._topics[topic.name] = topic
+
+    def write(
+        self, name: str, data: bytes, *, log_time: int, publish_time: int, sequence: int = 0
+    ) -> None:
+        """Add a message, as to a `RunWriter`."""
+        now = time.monotonic()
+        topic = self._topics[name]
+        message = _Message(now, topic, bytes(data), log_time, publish_time, sequence)
+        self._messages.append(message)
+        while self._messages[0].taken < now - self.seconds:
+            old = self._messages.popleft()
+            if old.topic.repeated:
+                kept = self._kept.setdefault(old.topic.name, deque(maxlen=old.topic.repeated))
+                kept.append(old)
+
+    def note(self, name: str, values: Mapping[str, str]) -> None:
+        """Keep named values for the runs to come."""
+        self._notes[name] = dict(values)
+
+    def attach_file(self, file: Path) -> None:
+        """Attach a file to the runs to come.
+
+        Raises:
+            OSError: If it cannot be read.
+        """
+        file.read_bytes()
+        self._files.append(file)
+
+    def save(
+        self,
+        folder: Path,
+        reason: str,
+        parameters: Mapping[str, list[tuple[dict[str, Any], int]]],
+        **options: Any,
+    ) -> int:
+        """Write what is kept as a run of its own, and go on.
+
+        Args:
+            folder: To make.
+            reason: Why, a sentence.
+            parameters: Of lathes, as for `closing_summary`.
+            options: As for `RunWriter`.
+
+        Returns:
+            How many messages it has.
+
+        Raises:
+            RunExistsError: If the folder exists.
+            DiskFullError: If the disk has too little room.
+            OSError: If it cannot be made or written.
+        """
+        log = RunLog()
+        older = [message for kept in self._kept.values() for message in kept]
+        messages = [*older, *self._messages]
+        with RunWriter(folder, **options) as writer:
+            for name, values in self._notes.items():
+                writer.note(name, values)
+            for file in self._files:
+                writer.attach_file(file)
+            for each in messages:
+                writer.add_topic(each.topic)
+                stamps = {'log_time': each.log_time, 'publish_time': each.publish_time}
+                writer.write(each.topic.name, each.data, **stamps, sequence=each.sequence)
+                log.receive(each.topic.name, each.topic.type, each.data, *stamps.values())
+            writer.note(SNAPSHOT, {'seconds': f'{self.seconds:g}', 'reason': reason})
+            writer.note(SUMMARY, closing_summary(log, parameters))
+            writer.commit()
+        return len(messages)
