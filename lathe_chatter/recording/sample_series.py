@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import LayoutError, ParameterError
 from lathe_chatter.recording.sample_reader import SampleBlocks
-from lathe_chatter.samples.continuity import Continuity
+from lathe_chatter.samples.continuity import Continuity, time_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,6 +126,9 @@ def joined(blocks: Iterable[SampleBlocks], expected: int, wanted: Selection) -> 
         blocks: In order.
         expected: How many messages there are, as far as is known.
         wanted: Columns and range.
+
+    Raises:
+        LayoutError: If a column is not there from some time on.
     """
     signals: _Signals | None = None
     log_times: list[Integers] = []
@@ -138,6 +141,10 @@ def joined(blocks: Iterable[SampleBlocks], expected: int, wanted: Selection) -> 
         if signals is None:
             names = tuple(name for name in part.columns if name in names)
             signals = _Signals(names, expected * int(part.rows[0]))
+        lacking = signals.names - set(part.columns)
+        if lacking:
+            since = time_text(part.times[0])
+            raise LayoutError(f'The samples from {since} on have no {", ".join(sorted(lacking))}.')
         times, chosen = part.times, part.signals
         last = times[np.maximum(np.cumsum(part.rows) - 1, 0)]
         log = part.log_times
@@ -169,6 +176,11 @@ class _Signals:
         self._arrays = {name: np.empty(expected) for name in names}
         self._room = expected
         self._size = 0
+
+    @property
+    def names(self) -> set[str]:
+        """Of the signals."""
+        return set(self._arrays)
 
     def append(self, names: Sequence[str], signals: Array) -> None:
         """Add named signals (k, n); all that were there at the beginning."""

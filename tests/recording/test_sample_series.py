@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.recorded import ARRAY, topic
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model.parameters import parameters_of
-from lathe_chatter.recording import LatheRun, Run, read_run
+from lathe_chatter.recording import LatheRun, Run, RunWriter, read_run
+from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import encode_block
 
 
 @pytest.fixture(scope='module')
@@ -52,3 +55,20 @@ def test_a_file_of_another_kind_is_no_run(tmp_path: Path) -> None:
     (tmp_path / 'notes.md').write_text('# notes')
     with pytest.raises(LatheChatterError, match=r'notes\.md is no MCAP file'):
         read_run(tmp_path / 'notes.md')
+
+
+def test_a_column_that_ends_is_one_sentence(tmp_path: Path) -> None:
+    lathe = VirtualLathe()
+    columns = SAMPLE_COLUMNS[:5]
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.add_topic(topic('/lathe/samples', ARRAY))
+        for k in range(4):
+            samples = lathe.advance(20)
+            data = encode_block(samples) if k < 2 else encode_block(samples[:, :5], columns)
+            writer.write('/lathe/samples', data, log_time=k + 1, publish_time=k + 1)
+    run = read_run(tmp_path / 'run')
+    with pytest.raises(
+        LatheChatterError, match=r'from 0\.004100 s on have no chip_thickness, cutt'
+    ):
+        run.samples()
+    assert len(run.samples(columns=columns).columns['time']) == 80
