@@ -1,105 +1,54 @@
-"""What damage to a file costs: flipped bits, and ends cut off at every record."""
+"""What damage to a run does: flipped bits, and ends cut off."""
 
 from __future__ import annotations
 
-import shutil
-import struct
-from collections.abc import Iterator
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from runs import START, TICK, block, samples_topic, scratch
+from runs import scratch
 
-from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.recording import RunReadError, RunWriter, read_run, recover, verify
-from lathe_chatter.recording.provenance import IDENTITY, identity
+sys.path.append(str(Path(__file__).parents[2] / 'tests'))
 
-_BLOCKS, _PER_COMMIT = 1000, 125
-_CHUNK = 6
+from support.damage import faults, flipped, held_by, record, truncated
 
+from lathe_chatter.recording import read_run, verify
 
-def _whole(place: Path) -> tuple[bytes, set[bytes]]:
-    """A file of 2 s in 8 chunks, and every sample in it."""
-    lathe = VirtualLathe()
-    rows: set[bytes] = set()
-    with RunWriter(place / 'whole') as writer:
-        writer.note(IDENTITY, identity())
-        writer.add_topic(samples_topic())
-        for k in range(_BLOCKS):
-            samples = lathe.advance(20)
-            rows |= {row.tobytes() for row in samples}
-            told = START + k * TICK
-            data = block(samples)
-            writer.write('/lathe/samples', data, log_time=told, publish_time=told, sequence=k + 1)
-            if k % _PER_COMMIT == _PER_COMMIT - 1:
-                writer.commit()
-    return (place / 'whole' / 'whole_0.mcap').read_bytes(), rows
-
-
-def _records(data: bytes) -> Iterator[tuple[int, int]]:
-    """Opcode and end of each record."""
-    at = 8
-    while at < len(data) - 8:
-        opcode, length = struct.unpack_from('<BQ', data, at)
-        at += 9 + length
-        yield opcode, at
-
-
-def _wrong(path: Path, rows: set[bytes]) -> tuple[int, int]:
-    """Samples that are handed out without an error, and wrong ones among them."""
-    try:
-        columns = read_run(path).samples().columns
-    except RunReadError:
-        return 0, 0
-    found = [row.tobytes() for row in np.column_stack(list(columns.values()))]
-    return len(found), sum(row not in rows for row in found)
-
-
-def _recovered(file: Path, place: Path) -> int:
-    """Messages that recover saves."""
-    shutil.rmtree(place, ignore_errors=True)
-    return recover(file, place).messages['/lathe/samples']
+Damage = Callable[[Path, Path, np.random.Generator], str]
 
 
 def flips(count: int) -> None:
-    """Flip one bit, many times."""
-    generator = np.random.default_rng()
-    noticed = wrong = 0
-    fewest = _BLOCKS
-    with scratch() as place:
-        whole, rows = _whole(place)
-        file = place / 'file_0.mcap'
-        for at in generator.integers(len(whole), size=count).tolist():
-            data = bytearray(whole)
-            data[at] ^= 1 << int(generator.integers(8))
-            file.write_bytes(data)
-            noticed += not verify(file).complete
-            wrong += _wrong(file, rows)[1]
-            fewest = min(fewest, _recovered(file, place / 'saved'))
-            wrong += _wrong(place / 'saved', rows)[1]
-    print(
-        f'flips: verify notices {noticed} of {count}; {wrong} wrong samples handed out; recovered '
-        f'at least {fewest} of {_BLOCKS} messages, of which a chunk has {_PER_COMMIT}'
-    )
+    """Flip one bit of an MCAP file or of metadata.yaml, many times."""
+    _judge('flips', flipped, count)
 
 
-def truncation() -> None:
-    """Cut a file at the end of every record."""
-    noticed = complete = count = wrong = 0
+def truncation(count: int) -> None:
+    """Cut off the end of a file, many times."""
+    _judge('truncation', truncated, count)
+
+
+def _judge(name: str, damage: Damage, count: int) -> None:
+    """Damage a run in many ways, and see whether anything wrong is handed out."""
+    seed = int(np.random.default_rng().integers(2**32))
+    generator = np.random.default_rng(seed)
+    wrong: Counter[str] = Counter()
+    noticed, began = 0, time.perf_counter()
     with scratch() as place:
-        whole, rows = _whole(place)
-        file = place / 'file_0.mcap'
-        chunks = 0
-        for opcode, end in _records(whole):
-            chunks += opcode == _CHUNK
-            if end >= len(whole) - 8:
-                break
-            file.write_bytes(whole[:end])
-            count += 1
-            noticed += not verify(file).complete
-            complete += _recovered(file, place / 'saved') == chunks * _PER_COMMIT
-            wrong += _wrong(file, rows)[1] + _wrong(place / 'saved', rows)[1]
+        record(place / 'whole')
+        whole = held_by(read_run(place / 'whole'))
+        (place / 'damaged').mkdir()
+        copy = place / 'damaged' / 'whole'
+        for _ in range(count):
+            where = damage(place / 'whole', copy, generator)
+            for fault in faults(copy, whole, place):
+                wrong[fault] += 1
+                print(f'{name}: {where}: {fault}')
+            noticed += not verify(copy).complete
     print(
-        f'truncation: verify notices {noticed} of {count}; every chunk before the cut is '
-        f'recovered in {complete} of {count}; {wrong} wrong samples handed out'
+        f'{name}: of {count}, verify notices {noticed}; what it does not notice changes nothing '
+        f'that is read. Wrong samples, parameters, notes or messages handed out, tracebacks: '
+        f'{sum(wrong.values())} (seed {seed}, {time.perf_counter() - began:.0f} s)'
     )

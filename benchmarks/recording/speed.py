@@ -9,7 +9,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from runs import PER_COMMIT, START, TICK, blocks, samples_topic, scratch
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+from runs import ARRAY, PER_COMMIT, START, STORE, TICK, blocks, samples_topic, scratch
 
 from lathe_chatter.recording import RunWriter, read_run
 from lathe_chatter.samples import SAMPLE_COLUMNS
@@ -66,6 +68,39 @@ def reading() -> None:
                 columns,
             ]
             subprocess.run(child, check=True)  # noqa: S603 -- ourselves
+        _read_by_others(place / 'run')
+
+
+def _read_by_others(run: Path) -> None:
+    """One column of the same run by the libraries that read bags, each as its manual has it."""
+    column = SAMPLE_COLUMNS.index('tool_displacement')
+
+    def by_rosbags() -> int:
+        with Reader(run) as reader:
+            parts = [
+                STORE.deserialize_cdr(data, ARRAY).data.reshape(-1, len(SAMPLE_COLUMNS))[:, column]
+                for _, _, data in reader.messages()
+            ]
+        return len(np.concatenate(parts))
+
+    def by_mcap() -> int:
+        size = 20 * len(SAMPLE_COLUMNS)
+        parts = []
+        for file in sorted(run.glob('*.mcap')):
+            with file.open('rb') as stream:
+                for _, _, message in make_reader(stream).iter_messages():
+                    numbers = np.frombuffer(message.data[-8 * size :])  # the end of the payload
+                    parts.append(numbers[column :: len(SAMPLE_COLUMNS)])
+        return len(np.concatenate(parts))
+
+    for name, read in (('rosbags', by_rosbags), ('mcap, payload cut by hand', by_mcap)):
+        began, busy = time.perf_counter(), time.process_time()
+        count = read()
+        print(
+            f'reading: {count / 1e6:.0f} million samples, 1 column, by {name} in '
+            f'{time.perf_counter() - began:.2f} s ({time.process_time() - busy:.2f} s of '
+            'processor time)'
+        )
 
 
 def read_here(run: str, columns: str) -> None:

@@ -16,7 +16,6 @@ from lathe_chatter.model.parameters import parameters_of
 from lathe_chatter.recording import LatheRun, Run, read_run, recover, verify
 from lathe_chatter.recording.recorded_cuts import recorded_cuts
 
-FILES = ('run_0.mcap', 'run_1.mcap', 'metadata.yaml')
 _TICKS, _PER_COMMIT = 60, 5
 
 
@@ -124,7 +123,7 @@ def _attempt(work: Callable[[], Any]) -> Any:
 def flipped(folder: Path, copy: Path, generator: np.random.Generator) -> str:
     """A copy of a run with one bit flipped; where."""
     _copied(folder, copy)
-    file = copy / FILES[generator.choice(3, p=[0.4, 0.35, 0.25])]
+    file = _files(copy)[generator.choice(3, p=[0.4, 0.35, 0.25])]
     data = bytearray(file.read_bytes())
     place = int(generator.integers(len(data)))
     bit = int(generator.integers(8))
@@ -136,11 +135,16 @@ def flipped(folder: Path, copy: Path, generator: np.random.Generator) -> str:
 def truncated(folder: Path, copy: Path, generator: np.random.Generator) -> str:
     """A copy of a run with the end of a file cut off; where."""
     _copied(folder, copy)
-    file = copy / FILES[generator.choice(3, p=[0.45, 0.45, 0.1])]
+    file = _files(copy)[generator.choice(3, p=[0.45, 0.45, 0.1])]
     data = file.read_bytes()
     kept = int(generator.integers(len(data)))
     file.write_bytes(data[:kept])
     return f'{file.name} after {kept} of {len(data)} bytes'
+
+
+def _files(folder: Path) -> list[Path]:
+    """Both MCAP files and metadata.yaml."""
+    return [*sorted(folder.glob('*.mcap')), folder / 'metadata.yaml']
 
 
 def _copied(folder: Path, copy: Path) -> None:
