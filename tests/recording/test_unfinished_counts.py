@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -107,3 +108,26 @@ def test_channels_beyond_the_page_are_not_counted(tmp_path: Path) -> None:
     for channel in (0, 1, 4094, 4095, 65535):
         counts.count(channel, 5)
     assert set(taken(tmp_path)) == {0, 1, 4094}
+
+
+def test_a_file_cut_off_amid_a_write_accuses_no_topic_of_being_absent(tmp_path: Path) -> None:
+    writer = RunWriter(tmp_path / 'run')
+    writer.add_topic(topic('/numbers'))
+    writer.add_topic(topic('/others'))
+    for k in range(1, 41):
+        for name in ('/numbers', '/others'):
+            writer.write(name, number(k), log_time=k, publish_time=k, sequence=k)
+        if k % 10 == 0:
+            writer.commit()
+    shutil.copytree(tmp_path / 'run', tmp_path / 'killed')
+    writer.close()
+    (file,) = (tmp_path / 'killed').glob('*.mcap')
+    file.write_bytes(file.read_bytes()[:-60])
+    for found in (
+        [finding.text for finding in verify(tmp_path / 'killed').findings],
+        recover(tmp_path / 'killed', tmp_path / 'saved').lost,
+    ):
+        assert any(
+            'The recorder did not finish: all that it had taken is there' in t for t in found
+        )
+        assert not [text for text in found if 'that had come' in text]
