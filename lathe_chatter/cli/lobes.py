@@ -27,7 +27,7 @@ from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.report.probability_chart import SURE
 from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_lobes
-from lathe_chatter.stability import GrowthMap, SafeLimit, growth_map
+from lathe_chatter.stability import GrowthMap, SafeLimit, SpeedLaw, growth_map, lowest_limit
 from lathe_chatter.stability.probability import StabilityProbability, stability_probability
 
 NAME = 'lobes'
@@ -45,7 +45,6 @@ _VARIED_MAP = (56, 20)
 _PROBABLE_SPEEDS = 200
 _WORTH_A_WORD = 0.05
 """Share of the variance below which a figure is not named."""
-_PARTS = 28
 _SHALLOWEST = 1000.0
 """Part of the top at which a map begins: at a depth of 0 there is no cut."""
 
@@ -70,6 +69,11 @@ def configure(parser: ArgumentParser) -> None:
         'those of the machine file, if it has any)',
     )  # fmt: skip
     parser.add_argument('--map', action='store_true', help='colour the chart with the growth rate')
+    parser.add_argument(
+        '--law', choices=[law.value for law in SpeedLaw], default=SpeedLaw.SPEED.value,
+        help="what swings where the speed is varied: the spindle's speed, or the delay, as most "
+        'of the literature has it (default: %(default)s)',
+    )  # fmt: skip
     parser.add_argument(
         '--output', type=Path, default=Path('lobes.png'), metavar='FILE',
         help='picture to write: .png with an .svg beside it, .svg or .pdf (default: %(default)s)',
@@ -104,7 +108,7 @@ def run(options: Namespace) -> int:
     screen = Screen(json=options.json)
     growth = None
     if options.map or config.cut.speed_variation_amplitude > 0.0:
-        growth = _map(config, low, high, top, screen)
+        growth = _map(config, low, high, top, SpeedLaw(options.law), screen)
     probability = None
     if growth is None:
         probability = _probability(options, config, low, high, screen)
@@ -140,29 +144,21 @@ def _top(limits: SafeLimit) -> float:
     return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
 
 
-def _map(config: LatheConfig, low: float, high: float, top: float, screen: Screen) -> GrowthMap:
-    """The growth rates over the chart, some speeds at a time."""
+def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where that is told
+    config: LatheConfig, low: float, high: float, top: float, law: SpeedLaw, screen: Screen
+) -> GrowthMap:
+    """The growth rates over the chart."""
     columns, rows = _VARIED_MAP if config.cut.speed_variation_amplitude > 0.0 else _MAP
-    depths = np.linspace(top / _SHALLOWEST, top, rows)
-    parts = []
     with screen.progress('growth rates', columns * rows) as bar:
-        for speeds in np.array_split(chart_speeds(low, high, columns), _PARTS):
-            parts.append(
-                growth_map(
-                    config.machine,
-                    config.cut,
-                    speeds,
-                    depths,
-                    tool_leaves_cut=config.setup.tool_leaves_cut,
-                )
-            )
-            bar.advance(speeds.size * rows)
-    return GrowthMap(
-        np.concatenate([part.spindle_speed_rpm for part in parts]),
-        depths,
-        np.hstack([part.growth_rate for part in parts]),
-        np.hstack([part.seated for part in parts]),
-    )
+        return growth_map(
+            config.machine,
+            config.cut,
+            chart_speeds(low, high, columns),
+            np.linspace(top / _SHALLOWEST, top, rows),
+            tool_leaves_cut=config.setup.tool_leaves_cut,
+            law=law,
+            progress=bar.advance,
+        )
 
 
 def _probability(
@@ -255,6 +251,8 @@ def _show(config: LatheConfig, limits: SafeLimit, screen: Screen) -> None:
         names.append(('on its bearing', limits.seated_limit))
     names.append(('safe', limits.depth_of_cut))
     for name, values in names:
-        place = int(np.argmin(values))
-        speed = limits.spindle_speed_rpm[place]
-        screen.say(f'lowest limit, {name}: {values[place] * 1e3:.4f} mm at {speed:.0f} rev/min')
+        lowest, low, high = lowest_limit(limits.spindle_speed_rpm, values)
+        where = f'at {low:.0f} rev/min'
+        if high > low:
+            where = f'in every lobe from {low:.0f} to {high:.0f} rev/min'
+        screen.say(f'lowest limit, {name}: {lowest * 1e3:.4f} mm {where}')

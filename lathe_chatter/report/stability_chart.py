@@ -131,10 +131,10 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
         BearingContact.SEATED: 'on its bearing',
     }[cut.bearing_contact]
     text = f'Stability chart: {bearing}'
-    if varied:
+    if varied and growth is not None:
         text += (
-            f'; colours and heavy line: speed varied by {cut.speed_variation_amplitude:.0%} at '
-            f'{cut.speed_variation_frequency:g} Hz'
+            f'; colours and heavy line: {growth.law.value} varied by '
+            f'{cut.speed_variation_amplitude:.0%} at {cut.speed_variation_frequency:g} Hz'
         )
     axes.set_title(text, fontsize=11)
 

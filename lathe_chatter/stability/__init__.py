@@ -18,6 +18,7 @@ from lathe_chatter.stability.safe_limit import (
     ContactAt,
     SafeLimit,
     contact_at,
+    lowest_limit,
     safe_limit,
     seating_depth,
 )
@@ -51,6 +52,7 @@ __all__ = [
     'growth_map',
     'leading_roots',
     'lobe_boundary',
+    'lowest_limit',
     'recommend_speeds',
     'rightmost_root',
     'rightmost_roots',

@@ -27,12 +27,14 @@ class GrowthMap:
         growth_rate: Of the rightmost root, or with a varying speed that of the dominant
             multiplier, 1/s (m, n).
         seated: Whether the workpiece rests on its bearing at the mean force (m, n).
+        law: What swings where the speed is varied.
     """
 
     spindle_speed_rpm: Array
     depth_of_cut: Array
     growth_rate: Array
     seated: NDArray[np.bool_]
+    law: SpeedLaw = SpeedLaw.SPEED
 
 
 def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
@@ -43,7 +45,7 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     *,
     tool_leaves_cut: bool = True,
     law: SpeedLaw = SpeedLaw.SPEED,
-    progress: Callable[[int, int], None] = lambda _done, _all: None,
+    progress: Callable[[int], object] = lambda _count: None,
 ) -> GrowthMap:
     """The growth rate at every speed and depth, at the clearance and feed speed of a cut.
 
@@ -55,7 +57,7 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
         depth_of_cut: Depths (m,), m.
         tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
         law: What swings where the speed is varied.
-        progress: Is told how many points of how many are known, now and then.
+        progress: Is told, now and then, how many more points are known.
 
     Raises:
         ParameterError: If a speed or depth is not allowed, or the answer would take minutes.
@@ -65,7 +67,6 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     line = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut).seating_line
     rests: NDArray[np.bool_] = depths[:, None] >= line
     growth = np.empty(rests.shape)
-    done = 0
     # A column at a time: so there is something to tell, and a varied speed shares its work.
     for column, speed in enumerate(speeds.tolist()):
         for seated in (False, True):
@@ -74,9 +75,8 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
                 growth[here, column] = _growth(
                     machine, cut, speed, depths[here], law, seated=seated
                 )
-        done += depths.size
-        progress(done, growth.size)
-    return GrowthMap(speeds, depths, growth, rests)
+        progress(depths.size)
+    return GrowthMap(speeds, depths, growth, rests, law)
 
 
 def _growth(  # noqa: PLR0913 -- a column of a map

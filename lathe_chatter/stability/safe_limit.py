@@ -35,6 +35,7 @@ from lathe_chatter.stability.characteristic import (
 from lathe_chatter.stability.critical_depth import critical_depth, critical_depths
 
 _CLEARANCE = Quantity('bearing clearance gamma', 'm')
+_AS_LOW = 1.005
 _FEED = Quantity('feed per revolution f', 'm')
 
 
@@ -55,6 +56,27 @@ class SafeLimit:
     open_limit: Array
     seated_limit: Array
     seating_line: Array
+
+
+def lowest_limit(spindle_speed_rpm: Array, limits: Array) -> tuple[float, float, float]:
+    """The lowest of some limits, and the speeds between which it is reached.
+
+    Every lobe has the same lowest limit: then there are several speeds, and which of them a chart
+    happens to come closest to says nothing.
+
+    Args:
+        spindle_speed_rpm: Rising speeds, rev/min (n,).
+        limits: At each, m (n,).
+
+    Returns:
+        The limit, m, and the lowest and highest speed of the minima within half a percent of it,
+        rev/min.
+    """
+    lowest = float(limits.min())
+    padded = np.concatenate(([math.inf], limits, [math.inf]))
+    minima = (limits <= padded[:-2]) & (limits <= padded[2:]) & (limits <= _AS_LOW * lowest)
+    speeds = spindle_speed_rpm[minima]
+    return lowest, float(speeds[0]), float(speeds[-1])
 
 
 class ContactAt(NamedTuple):

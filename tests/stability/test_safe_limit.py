@@ -12,6 +12,7 @@ from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import (
     contact_at,
     critical_depth,
+    lowest_limit,
     rightmost_roots,
     safe_limit,
     seating_depth,
@@ -89,3 +90,16 @@ def test_the_virtual_lathe_chatters_past_the_seating_line_though_below_the_open_
     lathe.advance(95000)
     end = lathe.advance(5000)[:, SAMPLE_COLUMNS.index('tool_displacement')]
     assert (np.ptp(end) > 10e-6) == lasts
+
+
+def test_the_lowest_limit_is_reached_in_every_lobe() -> None:
+    speeds = np.geomspace(800.0, 12000.0, 4000)
+    limits = safe_limit(Machine(), Cut(bearing_contact=BearingContact.NONE), speeds).depth_of_cut
+    lowest, low, high = lowest_limit(speeds, limits)
+    assert lowest == limits.min()
+    assert 1e3 * lowest == pytest.approx(0.5960, abs=2e-4)
+    assert low < 900.0
+    assert high > 4000.0
+    for speed in (low, high):
+        assert limits[speeds == speed] <= 1.005 * lowest
+    assert lowest_limit(speeds, speeds) == (800.0, 800.0, 800.0)
