@@ -54,14 +54,23 @@ def critical(rpm: float, *, seated: bool) -> float:
     return critical_depth(MACHINE, rpm, seated=seated)
 
 
+def _around(noise: str, rng: np.random.Generator) -> tuple[Surroundings, float]:
+    """Surroundings, and what is added to times of steps: in S0 they may fall anywhere in a hop."""
+    if noise != 'S0':
+        return NOISES[noise], 0.0
+    runout = float(rng.uniform(0.0, 5e-6))
+    return replace(NOISES[noise], tool_runout=runout), 1e-4 * int(rng.integers(100))
+
+
 def onset(noise: str, seed: int) -> Case:
     """A step from at most 0.9 to at least 1.05 times the critical depth."""
     rng = np.random.default_rng((1, seed))
     rpm, seated = STATES[seed % 4]
     limit = critical(rpm, seated=seated)
     before, after = rng.uniform(0.3e-3, 0.9 * limit), rng.uniform(1.05 * limit, 1.2e-3)
-    plan = (Stretch(BEFORE, rpm, before, seated), Stretch(5.0, rpm, after, seated))
-    return Case(f'onset {noise}', seed, plan, NOISES[noise], onset=BEFORE)
+    around, later = _around(noise, rng)
+    plan = (Stretch(BEFORE + later, rpm, before, seated), Stretch(5.0, rpm, after, seated))
+    return Case(f'onset {noise}', seed, plan, around, onset=BEFORE + later)
 
 
 def stable(noise: str, seed: int, duration: float = 60.0) -> Case:
@@ -79,9 +88,11 @@ def steps(noise: str, seed: int, count: int = 20) -> Case:
     rpm, seated = STATES[seed % 4]
     limit = 0.95 * critical(rpm, seated=seated)
     depths = rng.uniform(0.3e-3, limit, count + 2)
-    plan = tuple(Stretch(STEP, rpm, float(depth), seated) for depth in depths)
-    times = tuple(STEP * (1 + k) for k in range(1, count + 1))
-    return Case(f'steps {noise}', seed, plan, NOISES[noise], events=times, begin=times[0])
+    around, later = _around(noise, rng)
+    step = STEP + later
+    plan = tuple(Stretch(step, rpm, float(depth), seated) for depth in depths)
+    times = tuple(step * (1 + k) for k in range(1, count + 1))
+    return Case(f'steps {noise}', seed, plan, around, events=times, begin=times[0])
 
 
 def ramp(seed: int) -> Case:

@@ -62,6 +62,7 @@ class Surroundings:
         unbalance: Force on the workpiece once a turn, N, at every speed.
         harmonic_force: More forces on the workpiece: (times a turn, N).
         runout: At the workpiece's sensor, once, twice, ... a turn, m.
+        tool_runout: At the tool's sensor, once a turn, m.
     """
 
     force_noise: float = 2e-7
@@ -70,6 +71,7 @@ class Surroundings:
     unbalance: float = 0.05
     harmonic_force: Sequence[tuple[float, float]] = ()
     runout: Sequence[float] = HARMONICS
+    tool_runout: float = 0.0
     machine: Machine = field(default_factory=Machine)
 
 
@@ -198,6 +200,7 @@ def simulate(plan: Sequence[Stretch], around: Surroundings, seed: int) -> Array:
     turn = 2.0 * math.pi * out[:, 1]
     for number, amplitude in enumerate(around.runout, 1):
         out[:, 3] += amplitude * np.cos(number * turn + number)
+    out[:, 2] += around.tool_runout * np.cos(turn + 0.5)
     if around.sensor_noise:
         out[:, 2:] += around.sensor_noise * rng.standard_normal((len(out), 2))
     return out

@@ -34,6 +34,8 @@ _JUMP = 16.0
 """A disturbance: innovation of a resonator over its usual variance."""
 _BEYOND_GROWTH = 1.5
 """Innovation over the energy before that no growth explains."""
+_LEAP = 2.0
+"""A disturbance: rise of the logarithm of the energy ratio in one hop."""
 _PUSH = 12.0
 """A disturbance: misfit of the force in a hop over what is usual."""
 ARMED = 1.5
@@ -80,16 +82,21 @@ def follow_energy(state: DetectorState, newest: int) -> int:
             # Growth is no jump: it stays in proportion to what was there.
             if state.usual[2, j].real > 0.0 and innovation > _BEYOND_GROWTH * abs(before[j]) ** 2:
                 jump = innovation / state.usual[2, j].real
+    leapt = known and most - now.rise > _LEAP
     now.rise = most if known else np.nan
     now.since_jump += 1
+    now.hold_ended = 0
+    if now.alarmed != 0:
+        now.holding = 0
     if now.holding != 0:
         now.holding += 1
         calm = most < ARMED and now.since_jump > _SHORTEST_HOLD
         if now.holding > _LONGEST_HOLD:
             restart_baseline(state)
+            now.hold_ended = 1
         elif calm or not known:
             now.holding = 0
-    if jump > _JUMP and now.hops_seen > SETTLING:
+    if (jump > _JUMP or leapt) and now.hops_seen > SETTLING:
         hold(now)
     if free:
         now.block_fill += 1
@@ -102,7 +109,8 @@ def follow_energy(state: DetectorState, newest: int) -> int:
 def hold(now: Any) -> None:
     """Take no rise of energy for chatter until the disturbance is over."""
     now.since_jump = 0
-    now.holding = max(now.holding, 1)
+    if now.alarmed == 0:
+        now.holding = max(now.holding, 1)
 
 
 @compiled()

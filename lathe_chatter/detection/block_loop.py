@@ -17,16 +17,20 @@ from lathe_chatter.detection.identification import (
     noise_sums,
     rightmost_in_band,
 )
+from lathe_chatter.detection.machine_fit import take_hop
 from lathe_chatter.detection.records import Records
 from lathe_chatter.detection.signals import Memory, follow
 
 _REFERENCE = 3
-_ROOT_EVERY = 8
+_ROOT_EVERY, _NEW_CUT = 8, 12
+"""Hops from one search of the rightmost root to the next, and hops after a jump with one each."""
 _CLEAR = 0.4
 """Part of the signal that is no noise, from which on an identified cut is followed."""
 _DEEPER = 1.3
 """Times the identified C w: the cut whose rightmost root is followed too."""
 _NOISE_HOPS = 32
+_FIT_AFTER, _FIT_HOPS = 100, 250
+"""Hops until the means over turns have settled, and in a block of the fit of the machine."""
 
 
 @compiled()
@@ -76,9 +80,12 @@ def _follow_roots(now: Any, windows: Records, mechanics: Any, speed: float) -> N
 @compiled()
 def take_hops(
     block: Array, settings_: Records, mechanics_: Records, noise_: Records, total_: Records,
-    kernels: Kernels, memory: Memory, products: Records, windows: Records, state: DetectorState,
+    kernels: Kernels, memory: Memory, products: Records, windows: Records, plain: Records,
+    state: DetectorState,
 ) -> int:  # fmt: skip
-    """Take in hops until the samples are used up or the alarm is up, then one at a time.
+    """Take in hops until the samples are used up, or the caller has to look.
+
+    That is while the alarm is young, and where a block of the machine's fit is full.
 
     Args:
         block: Spindle angle, tool and workpiece displacement (n, 3), n a multiple of the hop.
@@ -89,7 +96,8 @@ def take_hops(
         kernels: From `filters.design`.
         memory: Of the signals, changed in place.
         products: Sums of the last hops (HOPS,), a ring, changed in place.
-        windows: What they say (windows,), written.
+        windows: What they say by the machine (windows,), written.
+        plain: What they say without, written.
         state: Of the judgement, changed in place.
 
     Returns:
@@ -97,7 +105,8 @@ def take_hops(
     """
     settings, mechanics, now = settings_[0], mechanics_[0], state.now[0]
     noise, total = noise_[0], total_[0]
-    done, model, hop = 0, settings.has_machine != 0, settings.hop
+    done, hop = 0, settings.hop
+    model = settings.has_machine != 0 and settings.believed != 0
     count = block.shape[0] // hop
     turns = kernels.poles ** (hop // settings.thinning)
     centres = np.angle(kernels.poles) * (settings.rate / settings.thinning)
@@ -105,6 +114,8 @@ def take_hops(
     while done < count:
         samples = block[done * hop : (done + 1) * hop]
         done += 1
+        between = now.holding in {1, 2} or now.ramping != 0 or now.alarmed != 0
+        take_hop(memory.fit, not between and now.hops_seen > _FIT_AFTER)
         newest = (now.newest + 1) % HOPS
         now.newest = newest
         follow(samples, settings, kernels, memory, products[newest])
@@ -120,14 +131,19 @@ def take_hops(
             continue
         if model:
             _noise(products, now, settings, kernels, speed, noise)
-            # The hop of a jump has two cuts in it, the one after it only the new one.
-            lengths[0] = 1 if now.holding == 1 else WINDOWS[0]
+            # After a jump there may be another cut: only what came since tells of it.
+            since = max(1, now.holding - 1) if now.holding > 0 else HOPS
+            for number in range(WINDOWS.size):
+                lengths[number] = min(WINDOWS[number], since)
             identify(products, newest, lengths, mechanics, noise, 1.0 / speed, now, total, windows)
-            if now.hops_seen % _ROOT_EVERY == 0:
+            if now.hops_seen % _ROOT_EVERY == 0 or 0 < now.holding <= _NEW_CUT:
                 _follow_roots(now, windows, mechanics, speed)
-        else:
-            _powers(products, newest, windows)
-        judge(state, settings, products, windows, memory.phases, turns, centres, speed)
+        _powers(products, newest, plain)
+        judge(state, settings, products, windows, plain, memory.phases, turns, centres, speed)
+        now.fit_hops += 1
+        if settings.has_machine != 0 and (now.fit_hops >= _FIT_HOPS or now.holding == 1):
+            now.fit_hops, now.fit_is_due = 0, 1
+            break
         if now.alarmed != 0 and now.since_alarm <= 64:
             break
     return done

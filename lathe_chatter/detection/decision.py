@@ -60,6 +60,10 @@ _STRICTER = 1.5
 """By how much surer growth must be without a model."""
 _PATIENT = 4
 """The shortest window whose growth is believed without a model."""
+_LOUD = 6.0
+"""Logarithm of the energy ratio from which on noise matters so little that shorter windows do."""
+_LOUD_LIMITS = (5.0, 3.5)
+"""Growth rate over its standard error that is an alarm then, in the two windows before."""
 _RAISED = 1.5
 """Logarithm of the energy ratio without which the growth rate alone is no alarm."""
 
@@ -68,9 +72,10 @@ _OFF_PHASE, _ON_PHASE = 0.2, 0.9
 _OUT_OF_CUT = 0.9
 _STEADY = 0.05
 _SATURATED = 20
-_CALM = 20
-_QUIET = 0.12
-"""Part of its peak at which chatter is over, if it is not back at the baseline before."""
+_CALM, _PERSISTENT = 20, 20
+_QUIET, _RECENT, _LASTING = 0.12, 3, 32
+"""Part of its peak at which chatter is over, if it is not back at the baseline before; the window
+in which it must be so; hops that a peak must last."""
 
 
 @compiled()
@@ -84,10 +89,21 @@ def _surely_stable(windows: Records) -> bool:
 
 
 @compiled()
+def _grows(windows: Records) -> bool:
+    """Whether a window says so, more likely than not."""
+    for number in range(windows.size):
+        if windows[number].growth > windows[number].growth_error:
+            return True
+    return False
+
+
+@compiled()
 def _score(state: DetectorState, windows: Records, model: bool, forced: bool) -> float:
     """1 is an alarm."""
     now = state.now[0]
     score, rise = 0.0, now.rise
+    if model and now.hold_ended != 0 and not _grows(windows):
+        rise = np.nan  # it holds the rise over the cut before
     short = windows[1] if model else windows[2]
     trust = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0) if model else 1.0
     sureness = short.growth / short.growth_error
@@ -103,16 +119,24 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
             score /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
         if model and trust >= 0.5 and _surely_stable(windows):
             score = min(score, _VETO)
-    free = model or now.since_jump > 12
+    loud = not model and rise > _LOUD and now.holding != 0
+    free = model or loud or now.since_jump > 12
     # Growth that is read from the energy says nothing new, and noise looks like it now and then.
-    first = 0 if model else _PATIENT
+    first = 0 if model else _PATIENT - 2 * loud
     if free and not (rise <= _RAISED and now.holding == 0):
         for number in range(first, windows.shape[0]):
             known = windows[number]
             if not trust >= 0.5:
                 break
+            cut_off = model and known.length < WINDOWS[number]
+            if cut_off and number > 0 and known.length <= WINDOWS[number - 1]:
+                break  # after a jump: it knows no more than the one before
             if known.growth > _SMALLEST_GROWTH:
                 limit = LIMITS[number] if model else _STRICTER * LIMITS[number]
+                if loud and number < _PATIENT:
+                    limit = _LOUD_LIMITS[number - first]
+                if cut_off:
+                    limit = LIMITS[max(number - 1, 0)]
                 limit *= _BESIDE_FORCED if forced else 1.0
                 score = max(score, known.growth / known.growth_error / limit)
     return score
@@ -147,7 +171,7 @@ def _saturated(
 
 
 @compiled()
-def _decide(state: DetectorState, strongest_amplitude: float) -> None:
+def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: float) -> None:
     """Raise the alarm, or clear it."""
     now = state.now[0]
     alarm = now.score >= now.strictness or now.saturated >= _SATURATED
@@ -157,16 +181,16 @@ def _decide(state: DetectorState, strongest_amplitude: float) -> None:
     if now.alarmed == 0:
         if now.suspected >= 1:
             now.alarmed, now.since_alarm, now.calm = 1, 0, 0
-            now.peak_amplitude, now.peak_spread = strongest_amplitude, now.spread
+            now.peak_amplitude = strongest_amplitude
         return
     now.since_alarm += 1
-    now.peak_amplitude = max(now.peak_amplitude, strongest_amplitude)
-    now.peak_spread = max(now.peak_spread, now.spread)
-    # Both the band and the spread once a turn must have died down; where the alarm came at the
-    # level of the noise there is no way down but to the baseline.
-    down = strongest_amplitude < _QUIET * now.peak_amplitude
-    down = down and not now.spread > 2.0 * _QUIET * now.peak_spread
-    down = down or now.rise < ARMED
+    # A knock is no peak: it has died out within some hops.
+    lasting = np.inf
+    for back in range(_LASTING):
+        lasting = min(lasting, state.amplitudes[(now.newest - back) % HOPS])
+    now.peak_amplitude = max(now.peak_amplitude, lasting)
+    # Where the alarm came at the level of the noise there is no way down but to the baseline.
+    down = recent_amplitude < _QUIET * now.peak_amplitude or now.rise < ARMED
     now.calm = now.calm + 1 if down else 0
     if now.calm >= _CALM:
         now.alarmed = now.saturated = 0
@@ -175,8 +199,8 @@ def _decide(state: DetectorState, strongest_amplitude: float) -> None:
 
 @compiled()
 def judge(
-    state: DetectorState, settings: Any, products: Records, windows: Records, phases: Array,
-    poles: Complex, centres: Array, speed: float,
+    state: DetectorState, settings: Any, products: Records, identified: Records, plain: Records,
+    phases: Array, poles: Complex, centres: Array, speed: float,
 ) -> None:  # fmt: skip
     """Judge the newest hop.
 
@@ -184,34 +208,41 @@ def judge(
         state: Changed in place; `now.newest` is its place in the rings.
         settings: A record of `signals.SETTINGS`.
         products: Sums of the last hops (HOPS,), as a ring.
-        windows: From `identification.identify`; written here where there is no model.
+        identified: From `identification.identify`, where there is a model.
+        plain: With the powers; growth is written here.
         phases: Once-per-turn statistics.
         poles: Of the resonators, per hop (bins,).
         centres: Their angular frequencies, 1/s (bins,).
         speed: Of the spindle, rev/s.
     """
     now = state.now[0]
-    newest, period, model = now.newest, settings.period, settings.has_machine != 0
+    newest, period = now.newest, settings.period
+    model = settings.has_machine != 0 and settings.believed != 0
     follow_speed(state, speed, 1.0 / max(speed * period, 1e-9))
     strongest = follow_energy(state, newest)
     if phases[PHASE_SEEN].min() >= 1.0:
         follow_phase(state, phases)
     wave = (np.nan, np.nan, np.nan)
-    if not model:
-        for number in range(WINDOWS.size):
+    if not model or now.rise > ARMED:
+        fresh = now.since_jump - 2.0 - 1.0 / max(speed * period, 1e-9)
+        for number in range(2, WINDOWS.size):
             length = min(WINDOWS[number], HOPS - 1)
-            if number < 2 or now.hops_seen < length + SETTLING:
-                windows[number].growth = windows[number].growth_error = np.nan
+            mixed = now.holding != 0 and length > fresh
+            if mixed or now.hops_seen < length + SETTLING:
                 continue
             wave = growth_by_energy(state, newest, strongest, length, period, poles[strongest])
-            windows[number].growth, windows[number].growth_error = wave[0], wave[1]
-            windows[number].angular_frequency = wave[2] + centres[strongest]
+            plain[number].growth, plain[number].growth_error = wave[0], wave[1]
+            plain[number].angular_frequency = wave[2] + centres[strongest]
+    windows = identified if model else plain
     now.hops_seen += 1
     omega = windows[2].angular_frequency
     comb = 1.0
     if omega == omega and speed > 0.0:
         comb = max(2.0 * abs(math.sin(0.5 * omega / speed)), 0.1)
-    amplitude = 2.0 * math.sqrt(max(windows[1].tool_power, 0.0)) / comb / settings.gain
+    by_power = 2.0 / comb / settings.gain
+    amplitude = by_power * math.sqrt(max(windows[1].tool_power, 0.0))
+    recent = by_power * math.sqrt(max(windows[_RECENT].tool_power, 0.0))
+    state.amplitudes[newest] = amplitude
     follow_push(state, products, newest)
     if model:
         follow_misfit(state, products[newest], windows[_TRUSTED].clearness > 0.5)
@@ -220,11 +251,19 @@ def judge(
         now.once_per_turn < _OFF_PHASE and now.synchronous_amplitude > settings.forced_amplitude
     )
     now.score = _score(state, windows, model, forced) if known else 0.0
+    state.plain_scores[newest] = 0.0
+    if model and known and now.rise > ARMED:
+        # The machine may be another than was told: what lasts is believed without it.
+        state.plain_scores[newest] = _score(state, plain, not model, forced)
+        lasting = np.inf
+        for back in range(_PERSISTENT):
+            lasting = min(lasting, state.plain_scores[(newest - back) % HOPS])
+        now.score = max(now.score, lasting)
     stiff = settings.tool_stiffness if model else 0.0
     if now.alarmed == 0 and now.ramping == 0 and speed > 0.0:
         steady = _saturated(state, products, newest, strongest, stiff)
         now.saturated = now.saturated + 1 if steady else 0
-    _decide(state, amplitude)
+    _decide(state, amplitude, recent)
     write_figures(state, windows, wave, model, amplitude)
-    cutting = not model or is_cutting(windows[WINDOWS.size - 1], products, newest)
+    cutting = is_cutting(now, windows[WINDOWS.size - 1], products, settings)
     now.state = state_of(state, cutting, forced)

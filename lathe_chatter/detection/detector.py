@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection.block_loop import take_hops
-from lathe_chatter.detection.detector_state import HOPS, UNKNOWN, WINDOWS, new_state
+from lathe_chatter.detection.detector_state import CHATTER, HOPS, UNKNOWN, WINDOWS, new_state
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filters import band_of, design, gain, thinning_of
 from lathe_chatter.detection.framing import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.identification import FIT, NOISE_SUMS, mechanics_of
+from lathe_chatter.detection.machine_fit import MachineFit, Verdict
 from lathe_chatter.detection.records import record
 from lathe_chatter.detection.signals import HOP_SUMS, SETTINGS, new_memory
 from lathe_chatter.detection.speed_advice import Identified, SpeedAdviser
@@ -22,6 +24,10 @@ from lathe_chatter.model import Machine
 _PAPER = Machine()
 _DECAY = 32.0
 """Of the resonators, 1/s: as narrow as the growth of chatter allows."""
+_CARRIED = 1000
+"""Hops that an alarm of other sensors is said to be old: its advice stands."""
+_UNSUSPICIOUS = 0.5
+"""Score below which the machine may be corrected: the baseline begins anew with it."""
 _HOP = 0.01
 """Length of a hop, about, s: what is judged together, against the decay of the resonators."""
 
@@ -54,13 +60,19 @@ class ChatterDetector:
         strictness: float = 1.0,
     ) -> None:
         """Begin with nothing known."""
-        self._machine = machine
+        self._machine = self._told = machine
+        self._correction: tuple[float, float] | None = None
         self._speed_range = speed_range
         self._adviser = SpeedAdviser(machine, speed_range)
         self._smallest = smallest_amplitude
         self._forced = forced_amplitude
         self._strictness = strictness
         self.reset()
+
+    def _forget(self) -> None:
+        self._estimate: Estimate = Estimate()
+        self._adviser.forget()
+        self._forget_format()
 
     def reset(self) -> None:
         """Forget everything, as at the start."""
@@ -89,13 +101,26 @@ class ChatterDetector:
                 self._forget()
             else:
                 self._start_stretch()
+                if not self._estimate.chatter:
+                    self._estimate = replace(self._estimate, state=STATES[UNKNOWN])
+        faults = self._framer.faults()
+        if faults != self._estimate.faults:
+            self._estimate = replace(self._estimate, faults=faults)
+        if self._framer.blind:
+            return replace(self._estimate, mode=Mode.BLIND)
         return self._estimate
 
-    def _forget(self) -> None:
-        self._estimate = Estimate()
-        self._adviser.forget()
+    def _forget_format(self) -> None:
         self._prepared: tuple[float, Mode] | None = None
         self._hop = 1
+
+    def set_machine(self, machine: Machine | None) -> None:
+        """Judge with another machine from the next samples on; an alarm stays."""
+        self._machine = self._told = machine
+        self._correction = None
+        self._adviser.machine = machine
+        self._framer.restart_stretch()
+        self._forget_format()
 
     def _prepare(self, form: StreamFormat) -> None:
         """Get ready for a stretch with this rate and these channels."""
@@ -126,8 +151,10 @@ class ChatterDetector:
             has_angle=form.angle,
             has_workpiece=form.workpiece,
             has_machine=mode is Mode.FULL,
+            believed=1,
         )
         middle = complex(0.0, 2.0 * math.pi * band.middle)
+        alarmed = self._estimate.chatter
         self._state = new_state(
             self._kernels.poles.size,
             smallest_amplitude=self._smallest,
@@ -136,8 +163,13 @@ class ChatterDetector:
             deeper_root=middle,
             root_cutting=0.0,
             root_stiffness=machine.workpiece.stiffness if machine is not None else 0.0,
+            # That a sensor died, or came back, is no sign that the chatter has ended.
+            alarmed=alarmed,
+            since_alarm=_CARRIED if alarmed else 0,
+            peak_amplitude=0.0,
         )
         self._now = self._state.now[0]
+        self._fit = MachineFit(machine or _PAPER)
         self._noise, self._total = record(NOISE_SUMS), record(HOP_SUMS)
         self._start_stretch()
 
@@ -146,13 +178,14 @@ class ChatterDetector:
         if self._prepared is None:
             return
         turn = self._thinned / max(self._speed_range[0] / 60.0, 0.5)
-        self._memory = new_memory(turn, self._kernels)
+        self._memory = new_memory(turn, self._kernels, int(self._settings['stride'][0]))
         self._sums = np.zeros(HOPS, HOP_SUMS)
         self._windows = np.repeat(record(FIT, math.nan), WINDOWS.size)
+        self._plain = self._windows.copy()
         self._state.motion[:] = 0.0
         self._state.speeds[:] = 0.0
         self._now.newest = self._now.hops_seen = 0
-        self._now.state = UNKNOWN
+        self._now.state = CHATTER if self._now.alarmed else UNKNOWN
 
     def _take(self, hops: HopBlock) -> None:
         """Judge some hops; stop where a speed has to be recommended."""
@@ -169,14 +202,50 @@ class ChatterDetector:
                 self._memory,
                 self._sums,
                 self._windows,
+                self._plain,
                 self._state,
             )
+            if now.fit_is_due:
+                now.fit_is_due = 0
+                self._fit.close_block(self._memory.fit)
+                self._weigh_machine()
             if not now.alarmed:
                 self._adviser.forget()
             elif self._adviser.is_due(since := int(now.since_alarm)):
-                modelled = self._mode is Mode.FULL
+                modelled = self._mode is Mode.FULL and bool(self._settings['believed'][0])
                 self._adviser.consider(self._identified(), since, modelled=modelled)
         self._estimate = self._new_estimate(float(hops.times[-1]))
+
+    def _weigh_machine(self) -> None:
+        """Believe the machine while it fits, judge without while it does not, and correct it."""
+        fit, told = self._fit, self._machine
+        if fit.verdict is Verdict.FITS:
+            self._settings['believed'] = 1
+        if fit.verdict is not Verdict.MISFIT or told is None:
+            return
+        self._settings['believed'] = 0
+        if fit.is_correctable and not self._now.alarmed and self._now.score < _UNSUSPICIOUS:
+            omega = 2.0 * math.pi * fit.frequency
+            self._machine = replace(told, tool=replace(told.tool, natural_frequency=omega))
+            self._adviser.machine = self._machine
+            self._correction = fit.frequency, fit.error
+            self._framer.restart_stretch()
+            self._forget_format()
+
+    def _machine_in_words(self) -> str:
+        """Whether the machine that was told is believed; empty where it is."""
+        if self._told is None or self._mode is not Mode.FULL:
+            return ''
+        hertz = self._told.tool.natural_frequency / (2.0 * math.pi)
+        if not self._settings['believed'][0]:
+            found = f'{self._fit.frequency:.1f} +- {self._fit.error:.1f} Hz'
+            return (
+                f'the tool, told at {hertz:.1f} Hz, is heard at {found}: judged without a machine'
+            )
+        if self._correction is not None:
+            found = '{:.1f} +- {:.1f} Hz'.format(*self._correction)
+            return f'the tool, told at {hertz:.1f} Hz, is taken at {found}, as it is heard'
+        return ''
 
     def _speed(self) -> float:
         """rev/s; nan where the spindle is not seen."""
@@ -195,7 +264,9 @@ class ChatterDetector:
         )
 
     def _new_estimate(self, time: float) -> Estimate:
-        now = self._now
+        now, mode, words = self._now, self._mode, self._machine_in_words()
+        if words:
+            mode = Mode.CORRECTED if self._settings['believed'][0] else Mode.MISFIT
         stiffness = float(now.stiffness)
         engaged = None
         if self._machine is not None and math.isfinite(stiffness):
@@ -205,7 +276,7 @@ class ChatterDetector:
             time,
             STATES[int(now.state)],
             bool(now.alarmed),
-            self._mode,
+            mode,
             float(now.growth),
             float(now.growth_error),
             float(now.omega) / (2.0 * math.pi),
@@ -217,4 +288,6 @@ class ChatterDetector:
             float(now.once_per_turn),
             float(now.score),
             self._adviser.advice,
+            self._framer.faults(),
+            words,
         )

@@ -25,14 +25,15 @@ IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = range(6)
 
 _NOW = record_type(
     """
-    usual_misfit misfits_seen peak_amplitude peak_spread score rise once_per_turn spread
+    usual_misfit misfits_seen peak_amplitude push score rise once_per_turn spread
     synchronous_amplitude smallest_amplitude strictness amplitude
     root_cutting root_stiffness
     growth growth_error omega cutting stiffness
     """,
     """
     newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
-    block_fill saturated stepped
+    block_fill saturated stepped hold_ended
+    fit_hops fit_is_due
     """,
     'root deeper_root',
 )
@@ -51,6 +52,8 @@ class DetectorState(NamedTuple):
         blocks: Mean energies in the blocks of the baseline (blocks, bins).
         baseline: Their mean, behind by a lag (bins,).
         speeds: Of the last hops, rev/s (SPEEDS,).
+        amplitudes: Of the tool in the last hops, as a ring, m (HOPS,).
+        plain_scores: What would be suspected without a machine, as a ring (HOPS,).
     """
 
     now: Records
@@ -59,15 +62,19 @@ class DetectorState(NamedTuple):
     blocks: Array
     baseline: Array
     speeds: Array
+    amplitudes: Array
+    plain_scores: Array
 
 
 def new_state(bins: int, **values: object) -> DetectorState:
     """Nothing known but the fields of `now` that are given."""
     return DetectorState(
-        record(_NOW, np.nan, misfits_seen=0.0, score=0.0, state=UNKNOWN, **values),
+        record(_NOW, np.nan, misfits_seen=0.0, push=0.0, score=0.0, state=UNKNOWN, **values),
         np.zeros((HOPS, bins), complex),
         np.zeros((3, bins), complex),
         np.zeros((BLOCK_COUNT + LAG + 1, bins)),
         np.full(bins, np.nan),
         np.zeros(SPEEDS),
+        np.zeros(HOPS),
+        np.zeros(HOPS),
     )

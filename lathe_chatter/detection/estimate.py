@@ -25,9 +25,12 @@ class Mode(str, Enum):
     """With how much the detector has to work."""
 
     FULL = 'both displacements and the machine are known'
+    CORRECTED = 'both displacements, and the machine with its tool as it is heard'
+    MISFIT = 'no machine, for the one that was told does not fit what is heard'
     ONE_SENSOR = 'one displacement only'
     NO_MACHINE = 'the machine is not known'
     NO_SPINDLE = 'the spindle is not seen'
+    BLIND = 'no displacement that can be believed'
     WAITING = 'no samples yet'
 
     @classmethod
@@ -68,6 +71,8 @@ class Estimate:
             1 for chatter, near 0 for vibration that is the spindle's own.
         score: Suspicion; 1 raises the alarm.
         advice: What to do about the chatter.
+        machine_fit: What is heard of a machine that was told wrong; empty where it fits.
+        faults: What is wrong with sensors that should be there, each in some words.
     """
 
     time: float = math.nan
@@ -85,6 +90,8 @@ class Estimate:
     once_per_turn: float = math.nan
     score: float = math.nan
     advice: Advice = field(default_factory=Advice)
+    faults: tuple[str, ...] = ()
+    machine_fit: str = ''
 
     @property
     def doubling_time(self) -> float:

@@ -27,21 +27,39 @@ _ONSET = 8
 """Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
 _CUTS, _PUSHED = 4.0, 32
 """Standard errors from which on a force is one, and hops over which its mean is taken."""
+_NO_PUSH = 0.25
+"""Of the largest mean push that there was: less is none."""
+_HEARD, _SURE, _NEXT_TO_NOTHING = 0.15, 3.0, 0.005
+"""Part of the signal that is no noise; standard errors; C w over the stiffness of the tool."""
 
 
 @compiled()
-def is_cutting(known: Any, products: Records, newest: int) -> bool:
-    """Whether anything is cut: C w is clearly not zero, or the tool is pushed aside on average."""
-    if not known.cutting <= _CUTS * known.cutting_error:
+def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
+    """Whether anything may be cut: only where nothing is for sure, the state is idle.
+
+    A tool that once was pushed aside on average and is no more cuts nothing. Who never was has
+    sensors without a mean, or there is none: then nothing is cut where nothing but the sensors'
+    noise is heard, or C w is surely next to nothing.
+    """
+    if known.cutting > _CUTS * known.cutting_error:
         return True
     mean = squares = 0.0
     for back in range(_PUSHED):
-        place = products[(newest - back) % HOPS].tool_mean
+        place = products[(now.newest - back) % HOPS].tool_mean
         mean += place / _PUSHED
         squares += place**2 / _PUSHED
     # Neighbours vibrate together: the mean of 32 is about as sure as that of 8.
     error = math.sqrt(max(squares - mean**2, 0.0) / (_PUSHED / 4.0))
-    return abs(mean) > _CUTS * error
+    if abs(mean) > _CUTS * error:
+        now.push = max(now.push, abs(mean))
+        return True
+    if now.push > 0.0:
+        return bool(abs(mean) + error > _NO_PUSH * now.push)
+    if settings.has_machine == 0:
+        return True
+    heard = known.clearness > _HEARD
+    most = known.cutting + _SURE * known.cutting_error
+    return bool(heard and not most < _NEXT_TO_NOTHING * settings.tool_stiffness)
 
 
 @compiled()

@@ -53,6 +53,7 @@ class Kernels(NamedTuple):
     Attributes:
         band: The band pass, without response to a constant; a vibration A cos gives |A| / 2 at
             the middle of the band.
+        slope: Its first derivative, 1/s.
         force: -(m_t s^2 + c_t s + k_t) of it: from the tool's displacement to the force, N.
         inertia: m_wp s^2 + c_wp s of it: from the workpiece's displacement, N.
         spill: What white noise of unit variance in the thinned samples adds to the sums:
@@ -61,6 +62,7 @@ class Kernels(NamedTuple):
     """
 
     band: Complex
+    slope: Complex
     force: Complex
     inertia: Complex
     spill: Array
@@ -134,7 +136,9 @@ def design(machine: Machine | None, rate: float, decay: float) -> Kernels:
     )
     count = 1 + math.ceil((chatter.high - chatter.low) / (_BIN_SPACING * chatter.middle))
     bins = np.linspace(chatter.low, chatter.high, count)
-    return Kernels(zeroth, force, inertia, spill, np.exp((-decay + 2j * np.pi * bins) / rate))
+    return Kernels(
+        zeroth, first, force, inertia, spill, np.exp((-decay + 2j * np.pi * bins) / rate)
+    )
 
 
 def thinning_of(machine: Machine | None, rate: float) -> tuple[int, int]:

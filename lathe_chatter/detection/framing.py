@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
+from lathe_chatter.detection.channel_watch import faults_of, new_channels, watch_channels
 from lathe_chatter.errors import LayoutError
 
 _TIME, _ANGLE, _TOOL, _WORKPIECE = (
@@ -60,10 +61,14 @@ class HopBlock(NamedTuple):
 
 
 class Framer:
-    """Finds the signals by their labels and follows their times.
+    """Finds the signals by their labels and follows their times and their health.
 
-    A sample that is no number counts as lost; a sensor that is dead or missing from the start
-    of a stretch is done without. Nothing depends on how the samples were cut into batches.
+    A sample that is no number counts as lost; a sensor that is dead or missing is done without
+    until it has been well for a while. Nothing depends on how the samples were cut into batches.
+
+    Attributes:
+        hop: Samples in a hop.
+        blind: Whether the newest sample has no displacement.
     """
 
     def __init__(self) -> None:
@@ -75,7 +80,20 @@ class Framer:
         self._last = math.nan
         self._dead: NDArray[np.bool_] = np.zeros(4, bool)
         self._names: tuple[str, ...] = ()
-        self._places, self._incomplete = np.zeros(4, np.int64), False
+        self._places, self._incomplete = np.full(5, -1), False
+        self._newest, self.blind = math.nan, False
+        self._channels = new_channels()
+
+    def faults(self) -> tuple[str, ...]:
+        """What is wrong with the sensors that should be there, each in some words."""
+        names = (_ANGLE, _TOOL, _WORKPIECE)
+        places = self._places[1:4]
+        labels = tuple(n if place >= 0 else '' for n, place in zip(names, places, strict=True))
+        return faults_of(self._channels, self._newest, labels)
+
+    def restart_stretch(self) -> None:
+        """Tell the format of the samples once more."""
+        self._step = self._last = math.nan
 
     def take(
         self, samples: Array, columns: Sequence[str]
@@ -102,6 +120,7 @@ class Framer:
                 if form is None:  # too short a stretch to know anything by
                     whole = _unbroken(rows[:_RATE_SAMPLES], self._last, self._step, self._dead)
                     restarted, rows = self._drop_to_break(rows, min(whole, _RATE_SAMPLES - 1))
+                    rows = rows[_blind(rows) :]
                     yield Discontinuity.RESTART if restarted else Discontinuity.GAP
                     continue
                 yield form
@@ -110,9 +129,7 @@ class Framer:
             taken = whole - whole % self.hop
             if taken:
                 self._last = float(rows[taken - 1, 0])
-                block = rows[:taken, 1:].copy()
-                block[:, self._dead[1:]] = 0.0
-                yield HopBlock(rows[:taken, 0], block)
+                yield HopBlock(rows[:taken, 0], self._block(rows[:taken]))
             rows = rows[taken:]
             if not broken:
                 break
@@ -120,56 +137,56 @@ class Framer:
             yield Discontinuity.RESTART if restarted else Discontinuity.GAP
         self._held, self._count = [rows], len(rows)
 
+    def _block(self, rows: Array) -> Array:
+        """Angle, tool and workpiece (n, 3); one sensor alone stands for the tool's."""
+        block = rows[:, 1:4].copy()
+        if self._dead[2]:
+            block[:, 1], block[:, 2] = block[:, 2], 0.0
+        block[:, [self._dead[1], False, self._dead[3]]] = 0.0
+        return block
+
     def _measure(self, rows: Array) -> StreamFormat | None:
         """Sample rate and channels of a stretch; None where it is broken before they are known."""
-        first = rows[:_RATE_SAMPLES]
+        first = rows[:_RATE_SAMPLES, :4]
         steps = np.diff(first[:, 0])
         steps = steps[np.isfinite(steps)]
         self._step = float(np.median(steps)) if len(steps) else math.nan
         self._dead = np.asarray(~np.isfinite(first).any(axis=0))
-        if self._dead[2] and not self._dead[3]:
-            # The workpiece's sensor alone stands for the tool's.
-            self._places[2], self._places[3], self._incomplete = self._places[3], -1, True
-            rows[:, 2], rows[:, 3] = rows[:, 3], math.nan
-            self._dead[2:] = False, True
-        usable = self._step > 0.0 and not self._dead[2]
-        if not usable:
+        if not self._step > 0.0 or self._dead[2:].all():
             self._step = self._step if self._step > 0.0 else 1.0
             self._dead[2] = False
             return None
         if _unbroken(first, self._last, self._step, self._dead) < _RATE_SAMPLES:
             return None
-        return StreamFormat(1.0 / self._step, not self._dead[1], not self._dead[3])
+        return StreamFormat(1.0 / self._step, not self._dead[1], not self._dead[2:].any())
 
     def _drop_to_break(self, rows: Array, at: int) -> tuple[bool, Array]:
         """Drop what is held up to the break; a stretch begins with the next sample."""
         times = rows[: at + 1, 0]
         before = times[at - 1] if at else self._last
         restarted = bool(times[at] <= before)
-        alive = rows[at][~self._dead]
+        alive = rows[at, :4][~self._dead]
         finite = bool(np.isfinite(alive).all())
         # Where the very first sample of a stretch is the odd one, it must go or nothing moves.
         drop = at + (not finite or (at == 0 and math.isnan(self._last)))
-        self._step = self._last = math.nan
-        self._names = ()
+        self.restart_stretch()
+        if restarted:
+            self._channels = new_channels()
         return restarted, rows[drop:]
 
     def _signals(self, samples: Array, columns: Sequence[str]) -> Array:
-        """Time, angle, tool and workpiece (n, 4), nan where there is no such column."""
+        """Time, angle, tool, workpiece and health (n, 5), nan where there is no such column."""
         names = tuple(columns)
         if names != self._names:
-            self._names = names
             wanted = (_TIME, _ANGLE, _TOOL, _WORKPIECE)
             places = [names.index(name) if name in names else -1 for name in wanted]
             if places[0] < 0 or max(places[2:]) < 0:
                 lacking = _TIME if places[0] < 0 else f'{_TOOL} and no {_WORKPIECE}'
-                self._names = ()
                 raise LayoutError(
                     f'The samples have no column {lacking}, only {", ".join(names)}.'
                 )
-            if places[2] < 0:
-                places[2], places[3] = places[3], -1
-            self._places, self._incomplete = np.array(places), min(places) < 0
+            self._names, self._places = names, np.array([*places, 0])
+            self._incomplete = min(places) < 0
         if samples.ndim != 2 or samples.shape[1] != len(names):
             raise LayoutError(
                 f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
@@ -177,12 +194,25 @@ class Framer:
         found: Array = samples.take(self._places, axis=1)
         if self._incomplete:
             found[:, self._places < 0] = math.nan
+        watch_channels(found, self._channels)
+        if len(found):
+            self._newest = float(found[-1, 0])
+            self.blind = not np.isfinite(found[-1, 2:4]).any()
         return found
 
 
 @compiled()
+def _blind(rows: Array) -> int:
+    """How many rows (n, 5) there are before one with a displacement."""
+    for i in range(rows.shape[0]):
+        if np.isfinite(rows[i, 2]) or np.isfinite(rows[i, 3]):
+            return i
+    return int(rows.shape[0])
+
+
+@compiled()
 def _unbroken(rows: Array, last: float, step: float, dead: NDArray[np.bool_]) -> int:
-    """How many rows (n, 4) continue the stretch."""
+    """How many rows (n, 4 or 5) continue the stretch."""
     before = last if last == last else rows[0, 0] - step
     for i in range(rows.shape[0]):
         now = rows[i, 0]
@@ -191,5 +221,7 @@ def _unbroken(rows: Array, last: float, step: float, dead: NDArray[np.bool_]) ->
         for column in range(1, 4):
             if not dead[column] and not np.isfinite(rows[i, column]):
                 return i
+            if dead[column] and rows.shape[1] > 4 and int(rows[i, 4]) & (1 << (column - 1)) != 0:
+                return i  # it is well again
         before = now
     return int(rows.shape[0])

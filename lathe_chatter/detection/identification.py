@@ -26,7 +26,8 @@ FIT = record_type(
     """
     cutting cutting_error stiffness stiffness_error growth growth_error angular_frequency
     clearness tool_power outputs
-    """
+    """,
+    'length',
 )
 """What one window knows, nan where unknown."""
 _MECHANICS = record_type(
@@ -231,7 +232,7 @@ def identify(
         known = windows[number]
         forget(known)
         count = total.outputs
-        known.outputs = count
+        known.outputs, known.length = count, lengths[number]
         if count < 2.0:
             continue
         known.tool_power = total.tool_power / count

@@ -20,13 +20,15 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.filters import Complex, Kernels
+from lathe_chatter.detection.machine_fit import FitSums, add_output, new_sums
 from lathe_chatter.detection.records import Records, record, record_type
 
 # Rows of the history of thinned samples.
-ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, CHIP, HISTORY_ROWS = range(6)
+ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, CHIP, TOOL_FREE, CHIP_FREE, HISTORY_ROWS = range(8)
 
-_COUNTS = record_type(integers='filled turn_before changes_from since_output')
-"""Samples held, place one turn ago, from where the changes hold, samples since an output."""
+_COUNTS = record_type(integers='filled turn_before changes_from free_from since_output')
+"""Samples held, place one turn ago, from where the changes and
+what is free of its mean hold, samples since an output."""
 
 HOP_SUMS = record_type(
     """
@@ -40,16 +42,20 @@ turn, pull F - m x'' - c x' = k x; third differences of the raw samples; mean of
 PHASES = 8
 """Spindle angles at which a value is taken once a turn."""
 _FORGETTING = 1.0 / 8.0
+_TURN_SHARE = 1.0 / 16.0
+"""What a turn changes of the mean at every spindle angle, by which the force is freed of all that
+repeats with the spindle, were it but runout at the sensor: a micrometre of it outweighs much."""
 # Rows of the once-per-turn statistics: running mean and variance, values seen.
 PHASE_MEAN, PHASE_VARIANCE, PHASE_SEEN, PHASE_ROWS = range(4)
 
 SETTINGS = record_type(
     'rate period gain tool_stiffness forced_amplitude slowest_turns',
-    'hop thinning stride has_angle has_workpiece has_machine',
+    'hop thinning stride has_angle has_workpiece has_machine believed',
 )
 """How samples are read and judged: sample rate, Hz; length of a hop, s; gain of the band pass;
 stiffness, N/m; amplitude from which on the spindle's own vibration is told, m; slowest speed,
-rev/s. Samples in a hop and in a thinned sample, thinned samples in an output; what is there."""
+rev/s. Samples in a hop and in a thinned sample, thinned samples in an output; what is
+there, and whether the machine is believed."""
 
 
 class Memory(NamedTuple):
@@ -60,15 +66,17 @@ class Memory(NamedTuple):
         counts: One record.
         resonators: (bins,).
         phases: Once-per-turn statistics (PHASE_ROWS, PHASES).
+        fit: Of the tool's equation.
     """
 
     history: Array
     counts: Records
     resonators: Complex
     phases: Array
+    fit: FitSums
 
 
-def new_memory(turn: float, kernels: Kernels) -> Memory:
+def new_memory(turn: float, kernels: Kernels, stride: int) -> Memory:
     """Nothing remembered yet, with room for turns of up to `turn` thinned samples."""
     keep = int(1.1 * turn) + kernels.band.size + 32
     return Memory(
@@ -76,6 +84,7 @@ def new_memory(turn: float, kernels: Kernels) -> Memory:
         record(_COUNTS),
         np.zeros(kernels.poles.size, complex),
         np.zeros((PHASE_ROWS, PHASES)),
+        new_sums(kernels, stride),
     )
 
 
@@ -103,6 +112,7 @@ def _make_room(history: Array, counts: Any) -> None:
     counts.filled = keep
     counts.turn_before = max(counts.turn_before - shift, 0)
     counts.changes_from = max(counts.changes_from - shift, 0)
+    counts.free_from = max(counts.free_from - shift, 0)
 
 
 @compiled()
@@ -115,6 +125,7 @@ def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
         return True
     angles = history[ANGLE]
     before = angles[n] - 1.0
+    history[TOOL_FREE, n] = history[CHIP_FREE, n] = 0.0
     p = counts.turn_before
     while p + 1 < n and angles[p + 1] <= before:
         p += 1
@@ -127,6 +138,14 @@ def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     history[TOOL_CHANGE, n] = history[CHIP, n] = tool
     if settings.has_workpiece != 0:
         history[CHIP, n] -= history[WORKPIECE, n] - _interpolated(history[WORKPIECE], p, x)
+    if settings.has_machine != 0 and p - 2 < counts.changes_from:
+        counts.free_from = n + 1
+    elif settings.has_machine != 0:
+        # x less its mean m, where m = m(t - tau) + share (x - m(t - tau)), without m itself.
+        keep = 1.0 - _TURN_SHARE
+        history[TOOL_FREE, n] = keep * (tool + _interpolated(history[TOOL_FREE], p, x))
+        before = history[CHIP, n] - _interpolated(history[CHIP], p, x)
+        history[CHIP_FREE, n] = keep * (before + _interpolated(history[CHIP_FREE], p, x))
     return True
 
 
@@ -153,17 +172,20 @@ def _take_phase(history: Array, n: int, phases: Array) -> None:
 
 @compiled()
 def _take_products(
-    history: Array, first: int, kernels: Kernels, settings: Any, products: Any
+    history: Array, first: int, kernels: Kernels, settings: Any, products: Any, fit: FitSums
 ) -> None:
     """Multiply the newest samples by the kernels and add up."""
-    force = chip = tool = pull = place = 0j
+    force = chip = tool = pull = place = slope = free = 0j
     for i in range(kernels.band.size):
         change = history[TOOL_CHANGE, first + i]
         tool += kernels.band[i] * change
         if settings.has_machine != 0:
             moved = change - history[CHIP, first + i]
-            force += kernels.force[i] * history[TOOL, first + i]
-            chip += kernels.band[i] * history[CHIP, first + i]
+            freed = history[TOOL_FREE, first + i]
+            force += kernels.force[i] * freed
+            slope += kernels.slope[i] * freed
+            free += kernels.band[i] * freed
+            chip += kernels.band[i] * history[CHIP_FREE, first + i]
             pull += kernels.force[i] * change - kernels.inertia[i] * moved
             place += kernels.band[i] * moved
     products.force_force += force.real**2 + force.imag**2
@@ -174,6 +196,8 @@ def _take_products(
     products.workpiece_workpiece += place.real**2 + place.imag**2
     products.tool_power += tool.real**2 + tool.imag**2
     products.outputs += 1.0
+    if settings.has_machine != 0:
+        add_output(fit, force, slope, free, place, chip)
 
 
 @compiled()
@@ -244,6 +268,7 @@ def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, produc
             memory.resonators[j] = kernels.poles[j] * memory.resonators[j] + history[CHIP, n]
         counts.since_output += 1
         first = n + 1 - taps
-        if counts.since_output >= settings.stride and first >= counts.changes_from:
+        known = first >= counts.changes_from and first >= counts.free_from
+        if counts.since_output >= settings.stride and known:
             counts.since_output = 0
-            _take_products(history, first, kernels, settings, products)
+            _take_products(history, first, kernels, settings, products, memory.fit)

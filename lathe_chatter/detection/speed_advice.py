@@ -238,12 +238,13 @@ class SpeedAdviser:
         speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
 
     Attributes:
+        machine: As given; it may be changed.
         advice: The one that stands.
     """
 
     def __init__(self, machine: Machine | None, speed_range: tuple[float, float]) -> None:
         """Nothing chatters yet."""
-        self._machine = machine
+        self.machine = machine
         self._speed_range = speed_range
         self.forget()
 
@@ -270,7 +271,7 @@ class SpeedAdviser:
         growth, error = known.growth_rate, known.growth_error
         if growth < -error or error > _VAGUE:
             return  # it dies down, or nobody knows
-        if self._machine is None or not modelled:
+        if self.machine is None or not modelled:
             self.advice = rule_of_thumb(known.frequency, self._speed_range)
             return
         if not error < self._error or growth + error < self._surely_grew:
@@ -278,11 +279,11 @@ class SpeedAdviser:
         self._error = error
         self._surely_grew = max(self._surely_grew, growth - error)
         self.advice = advise(
-            self._machine,
+            self.machine,
             known.cutting_stiffness,
             self._speed_range,
             known.spindle_speed_rpm,
-            seated=_seated(self._machine, known.workpiece_stiffness),
+            seated=_seated(self.machine, known.workpiece_stiffness),
         )
 
 

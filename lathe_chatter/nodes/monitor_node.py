@@ -15,18 +15,28 @@ from std_msgs.msg import Bool, Float64, String
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
+from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.parameters import machine_from
+from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from lathe_chatter.nodes.monitor_sentences import clearance, details, onset
+from lathe_chatter.nodes.monitor_sentences import (
+    SENTENCES,
+    clearance,
+    details,
+    onset,
+    sensors,
+    two_publishers,
+    withdrawn,
+)
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.real_time import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine
-from lathe_chatter.nodes.sample_stream import Fed, SampleFeed
+from lathe_chatter.nodes.sample_stream import SampleBatch, SampleSubscription
 from lathe_chatter.precompile import precompile
 from lathe_chatter.samples.continuity import BlockOrder, Continuity, times_of
 
@@ -42,6 +52,13 @@ _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
 _UNKNOWN = 'unknown'
+_TOPIC = 'lathe/samples'
+_FASTEST_PACE = 100.0
+"""Simulated seconds that a lathe cuts in one; and those of a backlog."""
+_MIXED = 1.0
+"""s within which times that leap twice are those of two lathes."""
+_IN_ORDER = 1.0
+"""Simulated seconds from block to block that are in order."""
 
 
 class MonitorNode(ParameterNode):
@@ -63,6 +80,7 @@ class MonitorNode(ParameterNode):
     def __init__(self, *, by_timer: bool = True, **options: Any) -> None:
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
+        self._log = BoundedLog(QuickLog(self.get_logger()))
         precompile()  # compiled before the first sample comes
         source = ModelSource(self.values['model'])
         self.machine: Machine | None = None
@@ -75,11 +93,15 @@ class MonitorNode(ParameterNode):
         self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
         self._state, self._flag = _UNKNOWN, False
-        self._told_advice = Advice()
+        self._logged_advice = Advice()
+        self._mode = Mode.WAITING
+        self._faults: tuple[str, ...] = ()
+        self._senders: list[str] = []  # where they are several, and nothing is judged
+        self._heard_at = self._leapt_at = self._newest = -math.inf
         self._figures: Mapping[str, float] = {}
         self._details: Mapping[str, object] = {}
         self._next_report = -math.inf
-        self._counted = _Counted(0, 0)
+        self._reported = _Reported(-math.inf, 0)
 
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
         self._state_publisher = self._publisher(String, 'state', _LATCHED)
@@ -89,7 +111,7 @@ class MonitorNode(ParameterNode):
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))
         self._state_publisher.publish(String(data=self._state))
-        self._feed = SampleFeed(self, self._complain)
+        self._subscription = SampleSubscription(self, self._complain)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._wake_at = time.monotonic_ns()
         if by_timer:
@@ -109,88 +131,157 @@ class MonitorNode(ParameterNode):
         """Take the blocks that have come."""
         rest = _REST_ON_WATCH if self._state == 'watch' else _REST
         self._wake_at = time.monotonic_ns() + rest
-        for fed in self._feed.take():
-            self._take(fed)
+        for batch in self._subscription.take():
+            self._take(batch)
 
-    def _take(self, fed: Fed) -> None:
-        samples, columns = fed.samples, fed.columns
+    def _take(self, batch: SampleBatch) -> None:
+        samples, columns = batch.samples, batch.columns
         try:
-            if fed.evenly:
-                self._follow(samples[:, columns.index('time')])
+            if batch.evenly:
+                times: Array = samples[:, columns.index('time')]
             else:
-                self._follow(times_of(samples, columns))
+                times = times_of(samples, columns)
+            if not self._follow(times):
+                return
             estimate = self._detector.update(samples, columns)
         except LatheChatterError as error:
             self._complain(error)
             return
         self._complaint = ''
-        self._tell(estimate)
+        self._publish(estimate)
 
     def _complain(self, error: LatheChatterError) -> None:
         self._complaint = str(error)
-        self.get_logger().error(self._complaint, throttle_duration_sec=10.0)
+        self._log.error(self._complaint, 'complaint')
 
-    def _follow(self, times: Array) -> None:
-        """Notice lost samples and a lathe that has started again."""
-        before = self._continuity.last
-        order = self._continuity.join(times, self._feed.is_another_lathe)
-        if order in {BlockOrder.FIRST, BlockOrder.RESTART}:
-            self._feed.know_lathe()
-            self._since = f'{times[0]:.6f}'
+    def _follow(self, times: Array) -> bool:
+        """Notice lost samples and another lathe; whether the samples can be judged."""
+        now, heard_at = time.monotonic(), self._heard_at
+        before, self._heard_at = self._continuity.last, now
+        if self._senders:
+            self._follow_mixture(times, now)
+            return False
+        # What a lathe cannot have cut meanwhile was not lost.
+        possible = _FASTEST_PACE * (now - heard_at) + _FASTEST_PACE
+        jumped = before is not None and times[0] - before > possible
+
+        def is_another() -> bool:
+            many = len(self._subscription.publishers()) > 1
+            return jumped or many or self._subscription.has_new_publisher()
+
+        order = self._continuity.join(times, is_another)
+        if order is BlockOrder.CONTIGUOUS:
+            return True
+        start = f'{times[0]:.6f} s'
+        if order is BlockOrder.GAP:
+            self._say('lost', f'At {before:.6f} s: the samples up to {start} did not come.')
+            return True
+        if order is BlockOrder.RESTART and self._is_mixture(now):
+            return False
+        self._subscription.remember_publishers()
+        self._since = f'{times[0]:.6f}'
         if order is BlockOrder.FIRST:
-            self.get_logger().info(f'Listening from {self._since} s on.')
-        elif order is BlockOrder.RESTART:
-            again = f'the lathe started again, and I with it from {self._since} s on'
-            self.get_logger().info(f'At {before:.6f} s: {again}.')
-            self._begin_again()
-            if self._asked is not None:
-                self._asked.ask()  # it may be another machine
-        elif order is BlockOrder.GAP:
-            self.get_logger().warning(
-                f'At {before:.6f} s: the samples up to {times[0]:.6f} s did not come.'
-            )
+            self._say('listening', f'Listening from {start} on.')
+            return True
+        if jumped:
+            why = 'more than a lathe can have cut meanwhile: I begin anew there'
+            jump = f'the times of the samples jump to {start}, {why}'
+            self._say('jump', f'At {before:.6f} s: {jump}.')
+        else:
+            again = f'the lathe started again, and I with it from {start} on'
+            self._say('restart', f'At {before:.6f} s: {again}.')
+        if self._flag:
+            self._say('withdrawn', withdrawn(times[0]))
+            self._set_flag(raised=False)
+        self._detector = self._new_detector()
+        self._next_report = -math.inf
+        if self._asked is not None:
+            self._asked.ask()  # it may be another machine
+        return True
+
+    def _is_mixture(self, now: float) -> bool:
+        """Whether two lathes send at once: times leap again, within a second, and many publish."""
+        leapt_at, self._leapt_at = self._leapt_at, now
+        names = self._subscription.publishers()
+        if len(names) < 2 or now - leapt_at > _MIXED:
+            return False
+        self._senders = names
+        self._say('two publishers', two_publishers(names))
+        self._set_state(_UNKNOWN)
+        self._diagnostics.publish_changes(self._statuses())
+        return True
+
+    def _follow_mixture(self, times: Array, now: float) -> None:
+        """While two lathes send: wait until what comes is in order again."""
+        newest, self._newest = self._newest, float(times[-1])
+        if not 0.0 < times[0] - newest < _IN_ORDER:
+            self._leapt_at = now
+        many = len(self._subscription.publishers()) > 1
+        if now - self._leapt_at > (2.0 * _MIXED if many else 0.0):
+            self._senders = []
+            self._continuity.last = None
 
     def _learn(self, machine: Machine) -> None:
         """Take the machine that the lathe says it is."""
         if machine != self.machine:
             self.machine = machine
-            self.get_logger().info('The lathe has told what machine it is.')
-            self._begin_again()
-
-    def _begin_again(self) -> None:
-        self._detector = self._new_detector()
-        self._next_report = -math.inf
+            self._say('machine', 'The lathe has told what machine it is.')
+            self._detector.set_machine(machine)
 
     def _new_detector(self) -> ChatterDetector:
         speeds = float(self.values['slowest_speed']), float(self.values['fastest_speed'])  # type: ignore[arg-type]  # numbers
         return ChatterDetector(self.machine, speed_range=speeds)
 
-    # -- telling ---------------------------------------------------------------------------
+    # -- what is said ----------------------------------------------------------------------
 
-    def _tell(self, estimate: Estimate) -> None:
+    def _say(self, kind: str, text: str) -> None:
+        """Log a sentence of `monitor_sentences.SENTENCES`."""
+        getattr(self._log, SENTENCES[kind].severity)(text, kind)
+
+    def _publish(self, estimate: Estimate) -> None:
         """Publish what is new, the figures before the flag that they explain."""
         changed = estimate.state != self._state or estimate.chatter != self._flag
         if changed or estimate.time >= self._next_report:
             if math.isfinite(estimate.time):  # not before the first hop
                 self._next_report = (estimate.time // _REPORT_PERIOD + 1.0) * _REPORT_PERIOD
             self._publish_figures(estimate)
-        if estimate.state != self._state:
-            self._state = estimate.state
-            self._state_publisher.publish(String(data=self._state))
+        self._set_state(estimate.state)
+        if estimate.faults != self._faults:
+            self._faults, changed = estimate.faults, True
+            self._details = details(estimate)
+            self._say('sensors' if self._faults else 'sensors well', sensors(estimate))
+        if estimate.mode is not self._mode:
+            self._say_machine_fit(estimate)
         if estimate.chatter != self._flag:
-            self._flag = estimate.chatter
-            self._flag_publisher.publish(Bool(data=self._flag))
-            # Two calls: rclpy allows each place in the code one severity.
+            self._set_flag(raised=estimate.chatter)
             if self._flag:
-                self.get_logger().warning(onset(estimate))
+                self._say('onset', onset(estimate))
             else:
-                self.get_logger().info(clearance(estimate))
-            self._told_advice = estimate.advice
-        elif estimate.advice.differs_from(self._told_advice):
-            self.get_logger().info(f'At {estimate.time:.6f} s: {estimate.advice.in_words()}.')
-            self._told_advice = estimate.advice
+                self._say('clearance', clearance(estimate))
+            self._logged_advice = estimate.advice
+        elif estimate.advice.differs_from(self._logged_advice):
+            self._say('advice', f'At {estimate.time:.6f} s: {estimate.advice.in_words()}.')
+            self._logged_advice = estimate.advice
         if changed:
             self._diagnostics.publish_changes(self._statuses())
+
+    def _say_machine_fit(self, estimate: Estimate) -> None:
+        """That the machine is believed no more, otherwise, or again."""
+        before, self._mode = self._mode, estimate.mode
+        if estimate.mode in {Mode.MISFIT, Mode.CORRECTED}:
+            self._say('machine fit', f'At {estimate.time:.6f} s: {estimate.machine_fit}.')
+        elif before is Mode.MISFIT and estimate.mode is Mode.FULL:
+            fits = 'the machine fits what is heard, and is believed again'
+            self._say('machine fits', f'At {estimate.time:.6f} s: {fits}.')
+
+    def _set_flag(self, *, raised: bool) -> None:
+        self._flag = raised
+        self._flag_publisher.publish(Bool(data=raised))
+
+    def _set_state(self, state: str) -> None:
+        if state != self._state:
+            self._state = state
+            self._state_publisher.publish(String(data=state))
 
     def _publish_figures(self, estimate: Estimate) -> None:
         figures = {name: float(getattr(estimate, name)) for name in _FIGURES}
@@ -208,17 +299,22 @@ class MonitorNode(ParameterNode):
 
     def _report(self) -> None:
         """Once a second; a second without samples means that nothing is known any more."""
+        self._log.look()
+        if self._subscription.adapt():
+            lost = 'so what gets lost is not sent again'
+            self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')
         if self._asked is not None and not self._asked.answered:
             self._asked.ask()
-        silent = self._continuity.samples == self._counted.samples
-        if silent and self._state != _UNKNOWN:
-            self._state = _UNKNOWN
-            self._state_publisher.publish(String(data=self._state))
-            self.get_logger().info(f'At {self._continuity.last:.6f} s: no samples come any more.')
+        silent = self._heard_at == self._reported.heard_at
+        if silent and self._senders:
+            self._senders, self._continuity.last = [], None
+        elif silent and self._state != _UNKNOWN:
+            self._set_state(_UNKNOWN)
+            self._say('silence', f'At {self._continuity.last:.6f} s: no samples come any more.')
         if not silent:
-            self._feed.know_lathe()
+            self._subscription.remember_publishers()
         self._diagnostics.publish(self._statuses(silent=silent))
-        self._counted = _Counted(self._continuity.samples, self._continuity.lost)
+        self._reported = _Reported(self._heard_at, self._continuity.lost)
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
         cut = {'state': self._state, 'flag': self._flag, **self._figures, **self._details}
@@ -239,17 +335,21 @@ class MonitorNode(ParameterNode):
         }
         if self._complaint:
             return Status('samples', ERROR, self._complaint, values)
+        if self._senders:
+            return Status('samples', ERROR, two_publishers(self._senders), values)
         if silent:
             return Status('samples', WARN, 'no samples come', values)
-        if heard.lost > self._counted.lost:
+        if self._faults:
+            return Status('samples', WARN, ', '.join(self._faults), values)
+        if heard.lost > self._reported.lost:
             return Status('samples', WARN, 'samples were lost', values)
         return Status('samples', OK, 'all samples came', values)
 
 
-class _Counted(NamedTuple):
-    """Where the counters stood at the last report."""
+class _Reported(NamedTuple):
+    """When samples had come, and how many were lost, at the last report."""
 
-    samples: int
+    heard_at: float
     lost: int
 
 

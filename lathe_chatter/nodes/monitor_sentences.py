@@ -1,10 +1,107 @@
-"""What the monitor says of the cut, in words and for the diagnostics."""
+"""Every sentence that the monitor logs, and when each is true; and the cut for the diagnostics."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from lathe_chatter.detection import Estimate
+
+
+class Sentence(NamedTuple):
+    """A kind of sentence.
+
+    Attributes:
+        severity: `info`, `warning` or `error`.
+        pattern: A regular expression that all of this kind match; a count may follow
+            (bounded_log.py).
+        true_when: What must be so when it is said; `tests/nodes` brings each about.
+    """
+
+    severity: str
+    pattern: str
+    true_when: str
+
+
+_AT = r'At \d+\.\d{6} s: '
+SENTENCES = {
+    'listening': Sentence(
+        'info',
+        r'Listening from [\d.]+ s on\.',
+        'these are the first samples, or the first after there were two publishers',
+    ),
+    'restart': Sentence(
+        'info',
+        _AT + r'the lathe started again, and I with it from [\d.]+ s on\.',
+        'times went back, or samples are missing and a publisher is new',
+    ),
+    'jump': Sentence(
+        'warning',
+        _AT + r'the times of the samples jump to [\d.]+ s, .*: I begin anew there\.',
+        'no lathe could have cut for so long since the last block, so nothing counts as lost',
+    ),
+    'lost': Sentence(
+        'warning',
+        _AT + r'the samples up to [\d.]+ s did not come\.',
+        'times leave samples out that one and the same publisher could have sent',
+    ),
+    'silence': Sentence(
+        'info',
+        _AT + r'no samples come any more\.',
+        'no sample came for a second, and some had before',
+    ),
+    'two publishers': Sentence(
+        'error',
+        r'[^ ]+ and [^ ]+.* publish .*, not one lathe: nothing is judged until one is left\.',
+        'several publish and the times of what comes leap to and fro',
+    ),
+    'best effort': Sentence(
+        'info',
+        r'A publisher of .* offers best effort only, .*\.',
+        'a publisher offers no more, and the subscription asks for no more from now on',
+    ),
+    'machine': Sentence(
+        'info',
+        r'The lathe has told what machine it is\.',
+        'the parameters of the lathe came, and are another machine than before',
+    ),
+    'sensors': Sentence(
+        'warning',
+        _AT + r'.+ (is not a number|stands still|is cut off at a limit of its range)'
+        r'; works with: .+\.',
+        'a channel that the labels name has been so within the last second',
+    ),
+    'sensors well': Sentence(
+        'info',
+        _AT + r'all sensors are well again; works with: .+\.',
+        'no channel has been at fault for a while, and one was before',
+    ),
+    'machine fit': Sentence(
+        'warning',
+        _AT + r'the tool, told at .+ is (heard at .+ without a machine|taken at .+ heard)\.',
+        "the tool's own equation, fitted over seconds of cutting, is not that of the told one",
+    ),
+    'machine fits': Sentence(
+        'info',
+        _AT + r'the machine fits what is heard, and is believed again\.',
+        'it did not before, and now the fit says so',
+    ),
+    'onset': Sentence('warning', _AT + r'chatter .+\.', 'the flag has just been raised'),
+    'advice': Sentence(
+        'info', _AT + r'(try|no stable speed) .+\.', 'chatter is flagged, and the advice is new'
+    ),
+    'clearance': Sentence(
+        'info',
+        _AT + r'the chatter has died out(; the cut is \w+)?\.',
+        'the vibration of this same run died down, or the spindle stands, or nothing is cut',
+    ),
+    'withdrawn': Sentence(
+        'info',
+        _AT + r'the flag is taken back, for this is another run; .+\.',
+        'the flag was up when another run began',
+    ),
+}
 
 
 def details(estimate: Estimate) -> dict[str, object]:
@@ -23,6 +120,8 @@ def details(estimate: Estimate) -> dict[str, object]:
     if advice := estimate.advice.in_words():
         details['advice'] = advice
     details['works with'] = estimate.mode.value
+    if estimate.machine_fit:
+        details['machine'] = estimate.machine_fit
     return details
 
 
@@ -35,9 +134,34 @@ def onset(estimate: Estimate) -> str:
     ]
     words = [text for value, text in known if math.isfinite(value)]
     words += [advice] if (advice := estimate.advice.in_words()) else []
-    return f'At {estimate.time:.6f} s: chatter {", ".join(words)}.'
+    return f'At {estimate.time:.6f} s: chatter {", ".join(words) or "flagged"}.'
 
 
 def clearance(estimate: Estimate) -> str:
     """That it is over."""
-    return f'At {estimate.time:.6f} s: the chatter has died out; the cut is {estimate.state}.'
+    cut = '' if estimate.state == 'unknown' else f'; the cut is {estimate.state}'
+    return f'At {estimate.time:.6f} s: the chatter has died out{cut}.'
+
+
+def withdrawn(at: float) -> str:
+    """That the flag is down though nobody knows that the chatter has ended."""
+    return (
+        f'At {at:.6f} s: the flag is taken back, for this is another run; whether the chatter '
+        'of the one before had ended is not known.'
+    )
+
+
+def sensors(estimate: Estimate) -> str:
+    """Which sensors cannot be believed, and what is done without them."""
+    works = f'works with: {estimate.mode.value}'
+    if not estimate.faults:
+        return f'At {estimate.time:.6f} s: all sensors are well again; {works}.'
+    return f'At {estimate.time:.6f} s: {", ".join(estimate.faults)}; {works}.'
+
+
+def two_publishers(names: Sequence[str]) -> str:
+    """Who publishes what only one may."""
+    return (
+        f'{", ".join(names[:-1])} and {names[-1]} publish lathe/samples, not one lathe: '
+        'nothing is judged until one is left.'
+    )

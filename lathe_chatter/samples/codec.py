@@ -90,7 +90,7 @@ def _block_layout(data: bytes) -> BlockLayout:
     skipped, count = words.unpack_from(body, place)
     place += words.size
     place += -place % 8 if count else 0
-    columns = tuple(labels[1].split(','))
+    columns = tuple(name.strip() for name in labels[1].split(','))
     (rows, _), (width, stride) = shape
     if width != len(columns):
         raise LayoutError(f'The label {labels[1]!r} does not name {width} columns.')

@@ -8,7 +8,7 @@ from support.node_bench import Bench
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.sample_stream import Fed, SampleFeed, together
+from lathe_chatter.nodes.sample_stream import SampleBatch, SampleSubscription, join_blocks
 from lathe_chatter.samples.codec import encode_block
 
 COLUMNS = ('time', 'tool_displacement')
@@ -20,28 +20,28 @@ def block(first: int, count: int) -> Array:
 
 
 def test_blocks_in_a_row_are_one() -> None:
-    (fed,) = together([block(0, 20), block(20, 20), block(40, 1)], COLUMNS)
+    (fed,) = join_blocks([block(0, 20), block(20, 20), block(40, 1)], COLUMNS)
     assert fed.evenly
     assert np.array_equal(fed.samples, block(0, 41))
 
 
 def test_blocks_with_a_gap_a_jump_back_or_no_times_stay_apart() -> None:
     for blocks in ([block(0, 20), block(40, 20)], [block(20, 20), block(0, 20)]):
-        fed = [*together(blocks, COLUMNS)]
+        fed = [*join_blocks(blocks, COLUMNS)]
         assert [each.evenly for each in fed] == [False, False]
         assert all(each.samples is given for each, given in zip(fed, blocks, strict=True))
-    (fed,) = together([block(0, 20)], ('angle', 'tool_displacement'))
+    (fed,) = join_blocks([block(0, 20)], ('angle', 'tool_displacement'))
     assert not fed.evenly
 
 
 def test_no_blocks_are_nothing() -> None:
-    assert not [*together([], COLUMNS)]
+    assert not [*join_blocks([], COLUMNS)]
 
 
 def test_what_is_no_block_is_complained_of_and_the_rest_taken(bench: Bench) -> None:
     complaints: list[LatheChatterError] = []
-    taken: list[Fed] = []
-    feed = SampleFeed(bench.node, complaints.append)
+    taken: list[SampleBatch] = []
+    feed = SampleSubscription(bench.node, complaints.append)
     publisher = bench.talk(Float64MultiArray, 'lathe/samples')
     publisher.publish(encode_block(block(0, 20), COLUMNS))
     publisher.publish(Float64MultiArray(data=[1.0, 2.0]))

@@ -1,0 +1,126 @@
+"""Which channels can be believed: those that give numbers, move, and meet no rail.
+
+A signal that moved by many of its own smallest steps from sample to sample and then repeats one
+value for 20 ms stands still: no vibration dies out like that, however coarse the sensor is. One
+that meets the same largest or smallest value again and again, at full speed, is cut off there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.compiled import compiled
+from lathe_chatter.detection.records import Records, record_type
+
+_CHANNEL = record_type(
+    'value pace slow_pace smallest_step entry_step run_since high low bad_at rail_at',
+    'run high_hits low_hits stood_still',
+)
+_AFTERWARDS = 0.5
+"""s that a channel must have been well before it is believed again."""
+_STILL, _STILL_SAMPLES = 0.02, 64
+"""s and samples of one and the same value that are no vibration."""
+_STEPS = 8.0
+"""Smallest steps that a signal must have moved in a sample, on average, for that."""
+_ROUNDING = 1e-10
+"""Steps this small against the value itself are none: a cut without noise comes to rest."""
+_PACES = 32.0
+"""Samples over which the pace of a signal is followed; the slow one over 32 times as many."""
+_RAIL, _RAIL_RUN, _RAIL_HITS, _RAIL_STEPS = 1.0, 3, 4, 4.0
+"""s between meetings of a rail, samples spent at it, meetings, smallest steps it is met with."""
+_CAUSES = ('is not a number', 'stands still', 'is cut off at a limit of its range')
+_NEVER = -1e300
+
+
+def new_channels() -> Records:
+    """Nothing seen of spindle angle, tool and workpiece displacement (3,)."""
+    channels = np.zeros(3, _CHANNEL)
+    channels['value'] = np.nan
+    channels['smallest_step'] = np.inf
+    channels['high'], channels['low'] = -np.inf, np.inf
+    channels['bad_at'] = channels['rail_at'] = _NEVER
+    return channels
+
+
+def faults_of(channels: Records, time: float, names: tuple[str, ...]) -> tuple[str, ...]:
+    """What is wrong with channels that should be there, in words.
+
+    Args:
+        channels: From `watch_channels` (3,).
+        time: Now, s.
+        names: Of the channels; empty where there is none.
+    """
+    found = []
+    for name, channel in zip(names, channels, strict=True):
+        if not name:
+            continue
+        if time - channel['bad_at'] < _AFTERWARDS:
+            found.append(f'{name} {_CAUSES[1 if channel["stood_still"] else 0]}')
+        elif time - channel['rail_at'] < _RAIL:
+            found.append(f'{name} {_CAUSES[2]}')
+    return tuple(found)
+
+
+@compiled()
+def _meets_rail(channel: Any, value: float) -> bool:
+    """Whether a value that has come some times in a row is a rail met once more."""
+    fast = channel.entry_step >= _RAIL_STEPS * channel.smallest_step
+    if value >= channel.high:
+        channel.high_hits = channel.high_hits + 1 if value == channel.high and fast else int(fast)
+        channel.high = value
+        return bool(channel.high_hits >= _RAIL_HITS)
+    if value <= channel.low:
+        channel.low_hits = channel.low_hits + 1 if value == channel.low and fast else int(fast)
+        channel.low = value
+        return bool(channel.low_hits >= _RAIL_HITS)
+    return False
+
+
+@compiled()
+def watch_channels(rows: Array, channels: Records) -> None:
+    """Follow the channels; what stands still is made no number.
+
+    Args:
+        rows: Time, spindle angle, tool and workpiece displacement, and, written: the sum of
+            1, 2 and 4 for each of them that has been well for a while (n, 5).
+        channels: From `new_channels`, changed in place.
+    """
+    for i in range(rows.shape[0]):
+        time, well = rows[i, 0], 0.0
+        for number in range(3):
+            channel = channels[number]
+            value = rows[i, number + 1]
+            if not np.isfinite(value):
+                channel.bad_at, channel.stood_still = time, 0
+                channel.value = np.nan
+                continue
+            step = abs(value - channel.value)
+            if step == 0.0:
+                channel.run += 1
+                if channel.run == _RAIL_RUN and number > 0 and _meets_rail(channel, value):
+                    channel.rail_at = time
+                long = time - channel.run_since > _STILL and channel.run > _STILL_SAMPLES
+                if number > 0:
+                    least = max(channel.smallest_step, _ROUNDING * abs(value))
+                    moved = channel.pace > _STEPS * least
+                else:  # a spindle needs time to stop
+                    moved = channel.pace > 0.5 * channel.slow_pace
+                if long and moved:
+                    channel.bad_at, channel.stood_still = time, 1
+                    rows[i, number + 1] = np.nan
+            elif np.isfinite(step):
+                channel.run, channel.run_since = 1, time
+                channel.entry_step = step
+                channel.smallest_step = min(channel.smallest_step, step)
+                channel.pace += (step - channel.pace) / _PACES
+                channel.slow_pace += (step - channel.slow_pace) / (32.0 * _PACES)
+            else:
+                channel.run, channel.run_since = 1, time
+            channel.value = value
+            # A time that jumps back is another run.
+            if not 0.0 <= time - channel.bad_at < _AFTERWARDS:
+                well += 2.0**number
+        rows[i, 4] = well

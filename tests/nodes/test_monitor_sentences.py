@@ -1,0 +1,252 @@
+"""The table of the monitor's sentences: each is brought about, and nothing else is said."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import Log
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool, Float64MultiArray
+from support.node_bench import LATCHED, Bench
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.detection import Estimate
+from lathe_chatter.detection.estimate import Mode
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.nodes.monitor_node import MonitorNode
+from lathe_chatter.nodes.monitor_sentences import SENTENCES
+from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import encode_block
+
+BLOCK = 200
+COUNT = r'( \(\d+ of this kind in \d+ s\.\))?'
+TOOL = SAMPLE_COLUMNS.index('tool_displacement')
+SEVERITIES = {'info': b'\x14', 'warning': b'\x1e', 'error': b'('}
+OPEN = {'bearing_contact': BearingContact.NONE}
+
+
+class Shop:
+    """The monitor, what it logs, and publishers of samples beside it."""
+
+    def __init__(self, bench: Bench, start: Callable[..., Any]) -> None:
+        self.bench, self.start = bench, start
+        self.log: list[Log] = bench.listen_first(Log, '/rosout', LATCHED)
+
+    def monitor(self, **parameters: Any) -> MonitorNode:
+        node: MonitorNode = self.start(MonitorNode, **parameters)
+        self.flags = self.bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+        return node
+
+    def said(self) -> list[Log]:
+        return [entry for entry in self.log if entry.name == 'chatter_monitor']
+
+    def says(self, kind: str) -> None:
+        """Wait until a sentence of this kind was logged."""
+        pattern = re.compile(SENTENCES[kind].pattern + COUNT)
+        self.bench.spin_until(
+            lambda: any(pattern.fullmatch(entry.msg) for entry in self.said()), kind
+        )
+
+    def send(self, publisher: Any, samples: Array) -> None:
+        for k in range(0, len(samples), BLOCK):
+            publisher.publish(encode_block(samples[k : k + BLOCK]))
+            self.bench.executor.spin_once(timeout_sec=0.01)
+
+
+def chatters(seconds: float = 2.0) -> Array:
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=1e-3, **OPEN))
+    return lathe.advance(round(seconds * 1e4))
+
+
+def flagged(shop: Shop) -> Any:
+    shop.monitor()
+    publisher = shop.bench.talk(Float64MultiArray, '/lathe/samples')
+    shop.send(publisher, chatters())
+    shop.bench.spin_until(lambda: shop.flags[-1].data, 'the flag')
+    return publisher
+
+
+def shifted(samples: Array, seconds: float) -> Array:
+    moved = samples.copy()
+    moved[:, 0] += seconds
+    return moved
+
+
+def listening(shop: Shop) -> None:
+    shop.monitor()
+    shop.send(shop.bench.talk(Float64MultiArray, '/lathe/samples'), chatters(1.0))
+
+
+def lost(shop: Shop) -> None:
+    shop.monitor()
+    samples = chatters(0.5)
+    samples = np.delete(samples, np.s_[1000:1500], axis=0)
+    shop.send(shop.bench.talk(Float64MultiArray, '/lathe/samples'), samples)
+
+
+def restart_while_flagged(shop: Shop) -> None:
+    shop.send(flagged(shop), VirtualLathe(cut=Cut(**OPEN)).advance(2000))
+    shop.bench.spin_until(lambda: not shop.flags[-1].data, 'the end of the flag')
+    assert not any('died out' in entry.msg for entry in shop.said())
+
+
+def jump(shop: Shop) -> None:
+    node = shop.monitor()
+    samples = chatters(0.4)
+    samples[2000:, 0] += 1.7e9
+    shop.send(shop.bench.talk(Float64MultiArray, '/lathe/samples'), samples)
+    shop.says('jump')
+    assert node._continuity.lost == 0
+
+
+def dead_sensor(shop: Shop) -> None:
+    publisher = flagged(shop)
+    samples = shifted(chatters(2.0), 2.0)
+    samples[:5000, TOOL] = np.nan
+    shop.send(publisher, samples)
+    shop.says('sensors')
+    shop.says('sensors well')
+    assert not any('died out' in entry.msg for entry in shop.said())
+    assert [flag.data for flag in shop.flags] == [False, True]
+
+
+def no_cure(shop: Shop) -> None:
+    shop.monitor()
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=1e-3, **OPEN))
+    publisher = shop.bench.talk(Float64MultiArray, '/lathe/samples')
+    shop.send(publisher, lathe.advance(15_000))
+    lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=4300.0))  # its root: +14.3 1/s
+    shop.send(publisher, lathe.advance(15_000))
+
+
+def cured(shop: Shop) -> None:
+    shop.monitor()
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=1e-3, **OPEN))
+    publisher = shop.bench.talk(Float64MultiArray, '/lathe/samples')
+    shop.send(publisher, lathe.advance(20_000))
+    lathe.retune(Cut(depth_of_cut=2e-4, **OPEN))
+    shop.send(publisher, lathe.advance(40_000))
+
+
+def two_publishers(shop: Shop) -> None:
+    node = shop.monitor()
+    others = [Node(f'lathe_{k}', context=shop.bench.node.context) for k in 'ab']
+    talkers = [n.create_publisher(Float64MultiArray, '/lathe/samples', 100) for n in others]
+    for talker in talkers:
+        shop.bench.spin_until(talker.get_subscription_count, 'the monitor')
+    samples = [chatters(1.0), shifted(chatters(1.0), 500.0)]
+    for k in range(0, 10_000, BLOCK):
+        for talker, each in zip(talkers, samples, strict=True):
+            talker.publish(encode_block(each[k : k + BLOCK]))
+        shop.bench.executor.spin_once(timeout_sec=0.01)
+    shop.says('two publishers')
+    (entry,) = [entry for entry in shop.said() if ' publish ' in entry.msg]
+    assert entry.msg.startswith('/lathe_a and /lathe_b publish')
+    assert node._continuity.lost == 0
+    assert len(shop.said()) < 10
+    others[1].destroy_node()
+    shop.bench.spin_until(lambda: len(node._subscription.publishers()) == 1, 'one publisher')
+    shop.send(talkers[0], shifted(samples[0], 1.0))
+    shop.bench.spin_until(lambda: not node._senders, 'the end of the mixture')
+    others[0].destroy_node()
+
+
+def best_effort(shop: Shop) -> None:
+    node = shop.monitor()
+    qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    talker = shop.bench.node.create_publisher(Float64MultiArray, '/lathe/samples', qos)
+    shop.bench.spin_until(talker.get_subscription_count, 'a subscription that fits')
+    shop.send(talker, chatters(0.2))
+    shop.bench.spin_until(lambda: node._continuity.samples > 0, 'samples')
+
+
+def asks_the_lathe(shop: Shop) -> None:
+    shop.start(LatheNode, **{'workpiece.mass': 0.04})
+    shop.monitor(model='lathe')
+
+
+def floods(shop: Shop) -> None:
+    shop.monitor()
+    samples = chatters(1.2)
+    publisher = shop.bench.talk(Float64MultiArray, '/lathe/samples')
+    for k in range(0, len(samples), 2 * BLOCK):
+        publisher.publish(encode_block(samples[k : k + BLOCK]))
+    shop.bench.spin_until(lambda: any(' of this kind in' in e.msg for e in shop.said()), 'a count')
+    assert len(shop.said()) <= 10
+
+
+def told_wrong(shop: Shop) -> None:
+    shop.monitor(**{'tool.natural_frequency': 700.0})
+    noises = {'force_noise': 4.5e-4, 'sensor_noise': 1e-7}
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=3e-4, **OPEN, **noises))
+    publisher = shop.bench.talk(Float64MultiArray, '/lathe/samples')
+    for _ in range(20):
+        shop.send(publisher, lathe.advance(10_000))
+
+
+def told_right_later(shop: Shop) -> None:
+    node = shop.monitor()
+    node._publish(
+        Estimate(
+            1.0,
+            mode=Mode.MISFIT,
+            machine_fit='the tool, told at 1 Hz, is heard at 2 Hz: judged without a machine',
+        )
+    )
+    node._publish(Estimate(2.0, mode=Mode.FULL))
+
+
+STORIES: dict[str, Callable[[Shop], None]] = {
+    'listening': listening,
+    'lost': lost,
+    'restart': restart_while_flagged,
+    'withdrawn': restart_while_flagged,
+    'jump': jump,
+    'silence': listening,
+    'two publishers': two_publishers,
+    'best effort': best_effort,
+    'machine': asks_the_lathe,
+    'sensors': dead_sensor,
+    'sensors well': dead_sensor,
+    'onset': flagged,
+    'advice': no_cure,
+    'clearance': cured,
+    'machine fit': told_wrong,
+    'machine fits': told_right_later,
+}
+
+
+@pytest.mark.parametrize('story', dict.fromkeys(STORIES.values()) | {floods: None})
+def test_each_sentence_is_said_when_it_is_true_and_no_other(
+    story: Callable[[Shop], Any], bench: Bench, start: Callable[..., Any]
+) -> None:
+    shop = Shop(bench, start)
+    story(shop)
+    for kind in [kind for kind, each in STORIES.items() if each is story]:
+        shop.says(kind)
+    for entry in shop.said():
+        kinds = [k for k, s in SENTENCES.items() if re.fullmatch(s.pattern + COUNT, entry.msg)]
+        assert len(kinds) == 1, entry.msg
+        assert bytes([entry.level]) == SEVERITIES[SENTENCES[kinds[0]].severity]
+
+
+def test_every_sentence_has_a_story_and_says_when_it_is_true() -> None:
+    assert STORIES.keys() == SENTENCES.keys()
+    assert all(sentence.true_when for sentence in SENTENCES.values())
+
+
+def test_a_space_after_the_comma_of_a_label_is_no_part_of_a_name(
+    bench: Bench, start: Callable[..., Any]
+) -> None:
+    node = start(MonitorNode)
+    publisher = bench.talk(Float64MultiArray, '/lathe/samples')
+    names = [f' {name}' for name in SAMPLE_COLUMNS]
+    publisher.publish(encode_block(chatters(0.1), names))
+    bench.spin_until(lambda: node._continuity.samples == 1000, 'the samples')
