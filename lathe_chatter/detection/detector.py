@@ -20,6 +20,7 @@ from lathe_chatter.detection.records import record
 from lathe_chatter.detection.signals import HOP_SUMS, SETTINGS, new_memory
 from lathe_chatter.detection.speed_advice import Identified, SpeedAdviser
 from lathe_chatter.model import Machine
+from lathe_chatter.model.machine import Structure
 
 _PAPER = Machine()
 _DECAY = 32.0
@@ -60,10 +61,11 @@ class ChatterDetector:
         strictness: float = 1.0,
     ) -> None:
         """Begin with nothing known."""
-        self._machine = self._told = machine
+        self._told = machine
+        self._machine = machine if _has_single_modes(machine) else None
         self._correction: tuple[float, float] | None = None
         self._speed_range = speed_range
-        self._adviser = SpeedAdviser(machine, speed_range)
+        self._adviser = SpeedAdviser(self._machine, speed_range)
         self._smallest = smallest_amplitude
         self._forced = forced_amplitude
         self._strictness = strictness
@@ -116,9 +118,10 @@ class ChatterDetector:
 
     def set_machine(self, machine: Machine | None) -> None:
         """Judge with another machine from the next samples on; an alarm stays."""
-        self._machine = self._told = machine
+        self._told = machine
+        self._machine = machine if _has_single_modes(machine) else None
         self._correction = None
-        self._adviser.machine = machine
+        self._adviser.machine = self._machine
         self._framer.restart_stretch()
         self._forget_format()
 
@@ -221,7 +224,7 @@ class ChatterDetector:
         fit, told = self._fit, self._machine
         if fit.verdict is Verdict.FITS:
             self._settings['believed'] = 1
-        if fit.verdict is not Verdict.MISFIT or told is None:
+        if fit.verdict is not Verdict.MISFIT or told is None or isinstance(told.tool, Structure):
             return
         self._settings['believed'] = 0
         if fit.is_correctable and not self._now.alarmed and self._now.score < _UNSUSPICIOUS:
@@ -234,7 +237,7 @@ class ChatterDetector:
 
     def _machine_in_words(self) -> str:
         """Whether the machine that was told is believed; empty where it is."""
-        if self._told is None or self._mode is not Mode.FULL:
+        if self._machine is None or self._told is None or self._mode is not Mode.FULL:
             return ''
         hertz = self._told.tool.natural_frequency / (2.0 * math.pi)
         if not self._settings['believed'][0]:
@@ -265,6 +268,8 @@ class ChatterDetector:
 
     def _new_estimate(self, time: float) -> Estimate:
         now, mode, words = self._now, self._mode, self._machine_in_words()
+        if mode is Mode.NO_MACHINE and self._told is not None:
+            mode = Mode.MANY_MODES
         if words:
             mode = Mode.CORRECTED if self._settings['believed'][0] else Mode.MISFIT
         stiffness = float(now.stiffness)
@@ -291,3 +296,9 @@ class ChatterDetector:
             self._framer.faults(),
             words,
         )
+
+
+def _has_single_modes(machine: Machine | None) -> bool:
+    """Whether the machine, if there is one, has what the identification takes: a mode each."""
+    parts = () if machine is None else (machine.tool, machine.workpiece)
+    return not any(isinstance(part, Structure) for part in parts)

@@ -27,6 +27,7 @@ class Mode(str, Enum):
     FULL = 'both displacements and the machine are known'
     CORRECTED = 'both displacements, and the machine with its tool as it is heard'
     MISFIT = 'no machine, for the one that was told does not fit what is heard'
+    MANY_MODES = 'no machine, for the one that was told has more than a mode each'
     ONE_SENSOR = 'one displacement only'
     NO_MACHINE = 'the machine is not known'
     NO_SPINDLE = 'the spindle is not seen'
