@@ -26,7 +26,7 @@ from lathe_chatter.detection.records import Records, record, record_type
 # Rows of the history of thinned samples.
 ANGLE, TOOL, WORKPIECE, TOOL_CHANGE, CHIP, TOOL_FREE, CHIP_FREE, HISTORY_ROWS = range(8)
 
-_COUNTS = record_type(integers='filled turn_before changes_from free_from since_output')
+_COUNTS = record_type('first_angle', 'filled turn_before changes_from free_from since_output')
 """Samples held, place one turn ago, from where the changes and
 what is free of its mean hold, samples since an output."""
 
@@ -141,11 +141,13 @@ def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     if settings.has_machine != 0 and p - 2 < counts.changes_from:
         counts.free_from = n + 1
     elif settings.has_machine != 0:
-        # x less its mean m, where m = m(t - tau) + share (x - m(t - tau)), without m itself.
-        keep = 1.0 - _TURN_SHARE
-        history[TOOL_FREE, n] = keep * (tool + _interpolated(history[TOOL_FREE], p, x))
+        # x less its mean over turns: y = x - x(t - tau) + keep y(t - tau). That there was nothing
+        # before the first sample must not echo, so the mean begins with one turn.
+        part = min((angles[n] - counts.first_angle) * _TURN_SHARE, 1.0)
+        keep = (1.0 - _TURN_SHARE) * part * part * (3.0 - 2.0 * part)
+        history[TOOL_FREE, n] = tool + keep * _interpolated(history[TOOL_FREE], p, x)
         before = history[CHIP, n] - _interpolated(history[CHIP], p, x)
-        history[CHIP_FREE, n] = keep * (before + _interpolated(history[CHIP_FREE], p, x))
+        history[CHIP_FREE, n] = before + keep * _interpolated(history[CHIP_FREE], p, x)
     return True
 
 
@@ -258,6 +260,8 @@ def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, produc
             for i in range(start, start + thinning):
                 total += block[i, row]
             history[row, n] = total / thinning
+        if n == 0:
+            counts.first_angle = history[ANGLE, n]
         counts.filled = n + 1
         products.tool_mean += history[TOOL, n] * thinning / block.shape[0]
         if settings.has_angle != 0 and n > 0:
