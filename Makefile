@@ -1,32 +1,54 @@
 # Two commands are all there is to know: `make run` and `make test`. Both install what they need.
-.PHONY: help run test test-kilted lint clean
+.PHONY: help run test test-core test-kilted lint everywhere bounds lock clean
 .DEFAULT_GOAL := help
 
 # Nodes of this checkout talk on this machine only, unless the user has said otherwise.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+# The Python to make environments with; empty: the first of 3.10 to 3.13 on PATH.
+export PYTHON ?=
 ARGS ?=
+PYTEST = -m pytest -n 2 --dist loadfile
+TALKS_TO_ROS = tests/nodes tests/cli/test_run.py
 
 help:
 	@echo 'make run   the main job: a virtual lathe chatters, is flagged and cured; the run is kept'
 	@echo '           (make run ARGS="--scenario no_clearance" for another scenario)'
-	@echo 'make test  linters, types and every test'
+	@echo 'make test  every test (make test ARGS="tests/recording -x" for some)'
+	@echo 'make lint  style and types'
+	@echo 'make test-core    the tests that do not talk to ROS'
 	@echo 'make test-kilted  what talks to ROS, on the wheels of ROS 2 Kilted instead of Jazzy'
+	@echo 'make everywhere   run and test as other users would: each Python, other folders and rights'
+	@echo 'make bounds       tests of the core on the lowest and newest versions that setup.py allows'
+	@echo 'make lock         write requirements/*.txt anew (make lock ARGS=--upgrade)'
 
 run:
-	@python=$$(scripts/environment) && $$python -m lathe_chatter.cli run $(ARGS)
+	@python=$$(scripts/environment) && "$$python" -m lathe_chatter.cli run $(ARGS)
 
 lint:
-	@python=$$(scripts/environment jazzy test) && $$python -m ruff check . \
-	  && $$python -m ruff format --check . && $$python -m mypy
+	@python=$$(scripts/environment lint) && "$$python" -m ruff check . \
+	  && "$$python" -m ruff format --check . && "$$python" -m mypy
 
-test: lint
-	@python=$$(scripts/environment jazzy test) && $$python -m lathe_chatter.precompile \
-	  && $$python -m pytest -n 2 --dist loadfile $(ARGS)
+test:
+	@python=$$(scripts/environment jazzy test) && "$$python" -m lathe_chatter.precompile \
+	  && "$$python" $(PYTEST) $(ARGS)
+
+test-core:
+	@python=$$(scripts/environment jazzy test) && "$$python" -m lathe_chatter.precompile \
+	  && "$$python" $(PYTEST) $(TALKS_TO_ROS:%=--ignore=%) $(ARGS)
 
 # The rest of the tests never import ROS: what passes with Jazzy passes with Kilted.
 test-kilted:
-	@python=$$(scripts/environment kilted test) && $$python -m lathe_chatter.precompile \
-	  && $$python -m pytest -n 2 --dist loadfile tests/nodes tests/commands/test_run.py $(ARGS)
+	@python=$$(scripts/environment kilted test) && "$$python" -m lathe_chatter.precompile \
+	  && "$$python" $(PYTEST) $(TALKS_TO_ROS) $(ARGS)
+
+everywhere:
+	@scripts/everywhere $(ARGS)
+
+bounds:
+	@scripts/bounds $(ARGS)
+
+lock:
+	@scripts/lock $(ARGS)
 
 clean:
-	rm -rf .venv-* build install log *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf .venv-* build dist install log *.egg-info .mypy_cache .ruff_cache .pytest_cache

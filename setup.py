@@ -1,33 +1,37 @@
 """Declares the package for pip and for colcon's ament_python build alike."""
 
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 from setuptools import find_packages, setup
 
 NAME = 'lathe_chatter'
+SOURCES = Path(__file__).resolve().parent  # also where colcon builds with links to them
 CONFIG = sorted(
     folder for folder in [Path('config'), *Path('config').rglob('*')] if folder.is_dir()
 )
 
 setup(
     name=NAME,
-    version='0.1.0',
+    version=ET.parse(SOURCES / 'package.xml').getroot().findtext('version'),
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: ['py.typed'], f'{NAME}.paper': ['*.j2']},
-    python_requires='>=3.10',
+    python_requires='>=3.10,<3.14',
     install_requires=[
-        'numpy',  # arrays of samples
-        'scipy',  # eigenvalues and special functions of the stability analysis
-        'numba',  # the inner loop, compiled without a compiler on the machine
-        'matplotlib',  # the pictures of a run
-        'rich',  # tables and progress bars of the command line
-        'jinja2',  # the page of the reproduction, from a template
-        'pyyaml',  # scenario files and metadata.yaml
-        'rosbags',  # reads the runs of any rosbag2 writer, and knows the message types
-        'mcap',  # writes and reads MCAP
-        'lz4',  # the compression of the chunks of a run
-        'zstandard',  # that of runs written by others
-        'isal',  # the CRCs of a run in a quarter of the time that zlib takes
+        'numpy>=1.26',  # arrays of samples
+        'scipy>=1.11',  # eigenvalues and special functions of the stability analysis
+        # The inner loop, compiled without a compiler on the machine. compiled.py sets flags that
+        # Numba documents nowhere: a newer one is allowed when the tests have passed with it.
+        'numba>=0.59,<0.69',
+        'matplotlib>=3.7',  # the pictures of a run
+        'rich>=13',  # tables and progress bars of the command line
+        'jinja2>=3.1',  # the page of the reproduction, from a template
+        'pyyaml>=6.0.1',  # scenario files and metadata.yaml
+        'rosbags>=0.10',  # reads the runs of any rosbag2 writer, and knows the message types
+        'mcap>=1.1',  # writes and reads MCAP
+        'lz4>=4.0',  # the compression of the chunks of a run
+        'zstandard>=0.22',  # that of runs written by others
+        'isal>=1.5',  # the CRCs of a run in a quarter of the time that zlib takes
     ],
     # A run in other hands; each is asked for only where it is used.
     extras_require={
@@ -49,13 +53,26 @@ setup(
     ],
     zip_safe=True,
     description='A virtual lathe with bearing clearance for ROS 2',
+    long_description=(SOURCES / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
     license='Apache-2.0',
+    keywords='chatter turning lathe delay-differential-equation ros2 digital-twin mcap',
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Education',
+        'Intended Audience :: Manufacturing',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        *(f'Programming Language :: Python :: 3.{minor}' for minor in range(10, 14)),
+        'Topic :: Scientific/Engineering :: Physics',
+        'Typing :: Typed',
+    ],
     entry_points={
         'console_scripts': [
-            'lathe = lathe_chatter.nodes.lathe_node:main',
-            'chatter_monitor = lathe_chatter.nodes.monitor_node:main',
-            'run_recorder = lathe_chatter.nodes.recorder_node:main',
-            'cell = lathe_chatter.nodes.cell:main',
+            'lathe = lathe_chatter.nodes.entry_points:lathe',
+            'chatter_monitor = lathe_chatter.nodes.entry_points:chatter_monitor',
+            'run_recorder = lathe_chatter.nodes.entry_points:run_recorder',
+            'cell = lathe_chatter.nodes.entry_points:cell',
             'lathe-chatter = lathe_chatter.cli.main:main',
         ],
     },

@@ -86,7 +86,7 @@ __all__ = [
     'verify',
 ]
 
-__version__ = '0.1.0'
+__version__: str
 
 # fmt: off
 _MODULES = {
@@ -115,6 +115,10 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
+    if name == '__version__':  # package.xml has it, and what is installed has it from there
+        from importlib.metadata import version
+
+        return version(__name__)
     if name not in _HOME:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     value = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)

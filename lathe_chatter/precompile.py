@@ -1,29 +1,99 @@
 """Compiles the inner loops once, so that nothing waits for it later.
 
-    python -m lathe_chatter.precompile
+    python -m lathe_chatter.precompile [lathe] [detector]
 
-The machine code is kept beside the package (or where NUMBA_CACHE_DIR says) and reused by every
-later process until the source changes.
+The machine code is kept (compiled.py says where) and reused by every later process until the
+source changes.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+from numba.core import event
+
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.stability import rightmost_root
 
-_BLOCK, _LONG_ENOUGH = 1000, 10
+LATHE_LOOP, DETECTOR_LOOP = 'lathe', 'detector'
+_CUT = Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.SEATED)
+_SAMPLE_RATE = 1e4
+_SENTENCE = 'Compiling the inner loops, once on this machine: some 20 s ...'
 
 
-def precompile() -> None:
-    """Cut until it chatters, and watch that: compiles or loads all that later calls need."""
-    detector = ChatterDetector()
-    lathe = VirtualLathe(cut=Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.SEATED))
-    for _ in range(_LONG_ENOUGH):
-        if detector.update(lathe.advance(_BLOCK), SAMPLE_COLUMNS).chatter:
-            break
+def precompile(*parts: str, say: Callable[[str], object] = lambda _sentence: None) -> None:
+    """Compile or load all that later calls need.
 
+    Where several parts are not there yet, each is compiled by a process of its own.
+
+    Args:
+        parts: `LATHE_LOOP`, `DETECTOR_LOOP` or both; none means all.
+        say: Is told in a sentence, at once, if something has to be compiled.
+    """
+    wanted = list(parts or _PARTS)
+    helpers: list[subprocess.Popen[bytes]] = []
+
+    def begin() -> None:
+        """Is called when the first part turns out not to be there."""
+        say(_SENTENCE)
+        command = [sys.executable, '-m', 'lathe_chatter.precompile']
+        helpers.extend(
+            subprocess.Popen(  # noqa: S603 -- this very module
+                [*command, part], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
+            for part in wanted[1:]
+        )
+
+    first_compilation = _FirstCompilation(begin)
+    event.register('numba:compile', first_compilation)
+    try:
+        for number, part in enumerate(wanted):
+            if number == 1:
+                for helper in helpers:
+                    helper.wait()
+            _PARTS[part]()
+    finally:
+        event.unregister('numba:compile', first_compilation)
+        for helper in helpers:
+            helper.terminate()
+            helper.wait()
+
+
+class _FirstCompilation(event.Listener):  # type: ignore[misc]  # Numba has no types
+    """Calls a function once, when Numba begins to compile what it found nowhere."""
+
+    def __init__(self, begin: Callable[[], None]) -> None:
+        self._begin: Callable[[], None] | None = begin
+
+    def on_start(self, _event: object) -> None:
+        begin, self._begin = self._begin, None
+        if begin is not None:
+            begin()
+
+    def on_end(self, _event: object) -> None:
+        pass
+
+
+def _cut() -> None:
+    VirtualLathe(cut=_CUT).advance(1000)
+
+
+def _detect() -> None:
+    """Watch a machine at rest, and load what advice about a speed takes."""
+    samples = np.zeros((2000, len(SAMPLE_COLUMNS)))
+    samples[:, 0] = np.arange(2000) / _SAMPLE_RATE
+    samples[:, 1] = samples[:, 0] * _CUT.spindle_speed_rpm / 60.0
+    ChatterDetector().update(samples, SAMPLE_COLUMNS)
+    rightmost_root(Machine(), _CUT.spindle_speed_rpm, _CUT.depth_of_cut, seated=True)
+
+
+_PARTS = {LATHE_LOOP: _cut, DETECTOR_LOOP: _detect}
 
 if __name__ == '__main__':
-    precompile()
+    precompile(*sys.argv[1:], say=lambda sentence: sys.stderr.write(f'{sentence}\n'))

@@ -32,7 +32,7 @@ ARROWS = {
     'stability': {'model'},
     'detection': {'model', 'stability'},
     'knocks': {'model', 'lathe', 'stability'},
-    'precompile': {'model', 'samples', 'lathe', 'detection'},
+    'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'samples', 'lathe', 'detection', 'recording'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},

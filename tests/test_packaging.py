@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tarfile
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from packaging.requirements import Requirement
 
 import lathe_chatter
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = {'lathe', 'chatter_monitor', 'run_recorder', 'cell', 'lathe-chatter'}
-SOURCES = ('setup.py', 'setup.cfg', 'package.xml', 'pyproject.toml', 'resource', 'config')
+OPTIONAL_IN_ROS = {'simulation_interfaces'}
+"""Used where they are; no machine needs them."""
+SOURCES = (
+    'setup.py',
+    'setup.cfg',
+    'package.xml',
+    'pyproject.toml',
+    'README.md',
+    'resource',
+    'config',
+)
 
 
 def run(command: list[str], **options: object) -> subprocess.CompletedProcess[str]:
@@ -36,7 +51,7 @@ def sources(tmp_path: Path) -> Path:
     return copy
 
 
-def test_package_xml_is_valid_and_agrees_on_the_version() -> None:
+def test_package_xml_is_valid_and_every_version_is_its() -> None:
     root = ET.parse(ROOT / 'package.xml').getroot()
     assert root.attrib['format'] == '3'
     assert root.findtext('name') == 'lathe_chatter'
@@ -47,6 +62,83 @@ def test_package_xml_is_valid_and_agrees_on_the_version() -> None:
 
 def test_changelog_has_the_version() -> None:
     assert f'\n{lathe_chatter.__version__} (' in (ROOT / 'CHANGELOG.rst').read_text()
+
+
+def imported_packages() -> set[str]:
+    """Top-level names that any module of the package imports, but for Python's and its own."""
+    names = set()
+    for file in (ROOT / 'lathe_chatter').rglob('*.py'):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.partition('.')[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names.add(node.module.partition('.')[0])
+    return names - sys.stdlib_module_names - {'lathe_chatter'}
+
+
+def declared_in_setup() -> dict[str, bool]:
+    """The distributions that the package asks for, and whether each is optional."""
+    return {
+        re.split(r'[^\w-]', text)[0].lower().replace('_', '-'): 'extra ==' in text
+        for text in requires('lathe_chatter') or ()
+    }
+
+
+def test_every_import_is_declared_in_setup_and_in_package_xml() -> None:
+    root = ET.parse(ROOT / 'package.xml').getroot()
+    keys = {element.text or '' for element in root.iter('exec_depend')}
+    for_rosdep = {key.removeprefix('python3-').removesuffix('-pip') for key in keys}
+    in_setup = declared_in_setup()
+    providers = packages_distributions()
+    lacking = []
+    for name in imported_packages() - OPTIONAL_IN_ROS:
+        if name in keys:  # a package of ROS 2, which the package index has no name for
+            continue
+        found = {each.lower().replace('_', '-') for each in providers.get(name, [name])}
+        optional = any(in_setup.get(each) for each in found)
+        if not found & in_setup.keys():
+            lacking.append(f'{name} in setup.py')
+        if name not in for_rosdep and not optional:
+            lacking.append(f'{name} in package.xml')
+    assert not lacking
+
+
+@pytest.mark.parametrize('lock', ['jazzy', 'kilted', 'test', 'lint'])
+def test_the_lock_has_all_that_setup_asks_for(lock: str) -> None:
+    text = (ROOT / 'requirements' / f'{lock}.txt').read_text()
+    locked = dict(re.findall(r'^([\w.-]+?)(?:\[\w+\])?==([\w.]+)', text, re.MULTILINE))
+    for line in requires('lathe_chatter') or ():
+        wanted = Requirement(line)
+        if wanted.marker is None:
+            assert wanted.specifier.contains(locked[wanted.name.lower()]), line
+    assert '://' not in text, 'a lock names no place to fetch from'
+
+
+def test_the_distributions_are_fit_for_the_index_and_the_sources_are_whole(
+    tmp_path: Path,
+) -> None:
+    if not (ROOT / '.git').exists():
+        pytest.skip('not a checkout: git tells which files are its sources')
+    listed = run(['git', 'ls-files'], cwd=ROOT)
+    if listed.returncode:
+        pytest.skip(f'git does not tell which files are sources: {listed.stderr.strip()}')
+    tracked = set(listed.stdout.splitlines())
+    copy = tmp_path / 'copy'
+    for name in tracked:
+        target = copy / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / name).exists():
+            shutil.copy2(ROOT / name, target)
+    output = tmp_path / 'dist'
+    built = run([sys.executable, '-m', 'build', '--no-isolation', '-o', str(output)], cwd=copy)
+    assert built.returncode == 0, built.stdout + built.stderr
+    files = [str(file) for file in output.iterdir()]
+    checked = run([sys.executable, '-m', 'twine', 'check', '--strict', *files])
+    assert checked.returncode == 0, checked.stdout
+    archive = next(output.glob('*.tar.gz'))
+    with tarfile.open(archive) as sources:
+        packed = {name.partition('/')[2] for name in sources.getnames()}
+    assert not tracked - packed
 
 
 def start_wrong(executable: Path, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -137,8 +137,7 @@ class Screen:
 
     def compile(self) -> None:
         """Compile the inner loops, or load what is compiled."""
-        with self.working('Compiling the integrator (once on a machine) ...'):
-            precompile()
+        precompile(say=self.say)
 
     @contextmanager
     def progress(self, what: str, total: float | None = None, unit: str = '') -> Iterator[Bar]:

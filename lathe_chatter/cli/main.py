@@ -25,10 +25,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, what the verb says (1 for a verdict that is no), 2 for a user's
         mistake, 128 and the number of the signal when interrupted: 130 after Ctrl-C.
     """
+    try:
+        os.getcwd()  # noqa: PTH109 -- pathlib takes time to import
+    except OSError:  # libraries want one as they are imported, and so do relative paths
+        sys.stderr.write('The working directory is not there any more: change to one that is.\n')
+        return USER_ERROR
     received: list[int] = []
+    ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {each: signal.getsignal(each) for each in ends}
+    # One that is ignored, as under nohup, stays so.
+    heard = [each for each in ends if before[each] != signal.SIG_IGN]
 
     def interrupt(number: int, _frame: FrameType | None) -> None:
-        """End on SIGTERM and SIGHUP as on Ctrl-C: what was begun is finished."""
+        """End in order: what was begun is finished."""
         received.append(number)
         raise KeyboardInterrupt
 
@@ -36,21 +45,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         """End at once while libraries are imported: nothing has begun."""
         os._exit(128 + number)
 
-    before = signal.signal(signal.SIGINT, end)
+    for each in heard:
+        signal.signal(each, end)
     from lathe_chatter.cli.verbs import parser
 
     options, unknown = parser().parse_known_args(arguments)
     if unknown:  # argparse itself would show how to give a verb, not its options
         options.usage_of.unknown(unknown)
-    others = {each: signal.signal(each, interrupt) for each in (signal.SIGTERM, signal.SIGHUP)}
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for each in heard:
+        signal.signal(each, interrupt)
     try:
         code = _carried_out(options)
     except KeyboardInterrupt:
         code = INTERRUPTED
     finally:
-        for each, handler in {signal.SIGINT: before, **others}.items():
-            signal.signal(each, handler)
+        for each in heard:
+            signal.signal(each, before[each])
     return 128 + received[0] if code == INTERRUPTED and received else code
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verd
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
+from lathe_chatter.nodes.entry_points import no_ros
 from lathe_chatter.nodes.process_group import RunFailedError
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.run import RunReadError
@@ -51,8 +53,9 @@ def run(options: Namespace) -> int:
         raise RunFailedError(f'{output} exists already: give another --output.')
     screen = Screen(json=options.json)
     screen.say(f'{scenario.title}  (scenario {scenario.name})', 'bold')
+    play = _player()
     screen.compile()
-    interrupted = _play(scenario, file, output, screen)
+    interrupted = play(scenario, file, output, screen)
     if interrupted and not _has_samples(output):
         shutil.rmtree(output, ignore_errors=True)  # else it would pass for a run
         screen.say('Interrupted before anything was recorded.')
@@ -81,18 +84,15 @@ def _has_samples(output: Path) -> bool:
         return False
 
 
-def _play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
-    """Play a scenario with a cell of nodes; whether it was interrupted.
+def _player() -> Callable[[Scenario, Path, Path, Screen], bool]:
+    """What plays a scenario with a cell of nodes.
 
     Raises:
-        RunFailedError: If there is no ROS 2 here, or the run fails.
+        RunFailedError: If there is no ROS 2 here.
     """
     try:
         with DeferredSignals():  # an import cut short would look like a ROS 2 that is not there
             from lathe_chatter.nodes.run_scenario import play
     except ImportError as error:
-        raise RunFailedError(
-            f'ROS 2 is not there ({error}): source an installation, or use `make run`, '
-            'which installs what it needs.'
-        ) from None
-    return play(scenario, file, output, screen)
+        raise RunFailedError(no_ros(error)) from None
+    return play

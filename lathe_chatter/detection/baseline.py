@@ -55,7 +55,7 @@ SETTLING = 20
 """Hops after which something is known."""
 
 
-@compiled()
+@compiled(inner=True)
 def follow_energy(state: DetectorState, newest: int) -> int:
     """Baselines and innovations of the resonators; the strongest bin of the last two hops."""
     now = state.now[0]
@@ -105,7 +105,7 @@ def follow_energy(state: DetectorState, newest: int) -> int:
     return strongest
 
 
-@compiled()
+@compiled(inner=True)
 def hold(now: Any) -> None:
     """Take no rise of energy for chatter until the disturbance is over."""
     now.since_jump = 0
@@ -113,7 +113,7 @@ def hold(now: Any) -> None:
         now.holding = max(now.holding, 1)
 
 
-@compiled()
+@compiled(inner=True)
 def _close_block(state: DetectorState) -> None:
     """Put the block that is full behind the others and renew the baseline."""
     blocks, now = state.blocks, state.now[0]
@@ -128,7 +128,7 @@ def _close_block(state: DetectorState) -> None:
             state.baseline[j] = max(blocks[1 + LAG : 1 + LAG + count, j].mean(), 1e-300)
 
 
-@compiled()
+@compiled(inner=True)
 def restart_baseline(state: DetectorState) -> None:
     """What was usual is so no more."""
     now = state.now[0]
@@ -137,7 +137,7 @@ def restart_baseline(state: DetectorState) -> None:
     state.baseline[:] = np.nan
 
 
-@compiled()
+@compiled(inner=True)
 def growth_by_energy(
     state: DetectorState, newest: int, bin_: int, length: int, period: float, pole: complex
 ) -> tuple[float, float, float]:
@@ -159,7 +159,7 @@ def growth_by_energy(
     return math.log(size) / period, error, math.atan2(turn.imag, turn.real) / period
 
 
-@compiled()
+@compiled(inner=True)
 def follow_phase(state: DetectorState, phases: Array) -> None:
     """Once-per-turn spread and what part of all vibration it is."""
     within = mean = total = 0.0
@@ -177,7 +177,7 @@ def follow_phase(state: DetectorState, phases: Array) -> None:
     now.once_per_turn = within / (within + total) if known else np.nan
 
 
-@compiled()
+@compiled(inner=True)
 def follow_speed(state: DetectorState, speed: float, hops_a_turn: float) -> None:
     """Notice ramps; they are over when a turn has passed, and what was usual is so no more."""
     speeds, now = state.speeds, state.now[0]
@@ -195,7 +195,7 @@ def follow_speed(state: DetectorState, speed: float, hops_a_turn: float) -> None
         now.ramping = int(_RAMP_HOLD + hops_a_turn)
 
 
-@compiled()
+@compiled(inner=True)
 def follow_push(state: DetectorState, products: Records, newest: int) -> None:
     """Notice a step of the mean force: another cut, whose vibration may stay larger than before.
 
@@ -222,7 +222,7 @@ def follow_push(state: DetectorState, products: Records, newest: int) -> None:
         now.stepped = _STEP_HOLD
 
 
-@compiled()
+@compiled(inner=True)
 def follow_misfit(state: DetectorState, products: Any, clear: bool) -> None:
     """What the force usually differs by from C w h, while nothing happens."""
     now = state.now[0]

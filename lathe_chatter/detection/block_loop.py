@@ -33,7 +33,7 @@ _FIT_AFTER, _FIT_HOPS = 100, 250
 """Hops until the means over turns have settled, and in a block of the fit of the machine."""
 
 
-@compiled()
+@compiled(inner=True)
 def _powers(products: Records, newest: int, windows: Records) -> None:
     """Without a model: the tool's power in each window."""
     for number in range(WINDOWS.size):
@@ -47,7 +47,7 @@ def _powers(products: Records, newest: int, windows: Records) -> None:
         windows[number].tool_power = power / count if count > 0.0 else np.nan
 
 
-@compiled()
+@compiled(inner=True)
 def _noise(
     products: Records, now: Any, settings: Any, kernels: Kernels, speed: float, noise: Any
 ) -> None:
@@ -61,7 +61,7 @@ def _noise(
     noise_sums(kernels.spill, tool * share, workpiece * share, thinned / speed, noise)
 
 
-@compiled()
+@compiled(inner=True)
 def _follow_roots(now: Any, windows: Records, mechanics: Any, speed: float) -> None:
     """The rightmost roots of the cut as it is, and of a deeper one."""
     reference = windows[_REFERENCE]

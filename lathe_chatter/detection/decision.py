@@ -78,7 +78,7 @@ _QUIET, _RECENT, _LASTING = 0.12, 3, 32
 in which it must be so; hops that a peak must last."""
 
 
-@compiled()
+@compiled(inner=True)
 def _surely_stable(windows: Records) -> bool:
     """Whether one of the windows that know of a new cut at once says that it is stable."""
     for number in range(_TRUSTED + 1):
@@ -88,7 +88,7 @@ def _surely_stable(windows: Records) -> bool:
     return False
 
 
-@compiled()
+@compiled(inner=True)
 def _grows(windows: Records) -> bool:
     """Whether a window says so, more likely than not."""
     for number in range(windows.size):
@@ -97,7 +97,7 @@ def _grows(windows: Records) -> bool:
     return False
 
 
-@compiled()
+@compiled(inner=True)
 def _score(state: DetectorState, windows: Records, model: bool, forced: bool) -> float:
     """1 is an alarm."""
     now = state.now[0]
@@ -142,7 +142,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
     return score
 
 
-@compiled()
+@compiled(inner=True)
 def _saturated(
     state: DetectorState, products: Records, newest: int, strongest: int, stiff: float
 ) -> bool:
@@ -170,7 +170,7 @@ def _saturated(
     return spread < _STEADY * total
 
 
-@compiled()
+@compiled(inner=True)
 def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: float) -> None:
     """Raise the alarm, or clear it."""
     now = state.now[0]
@@ -197,7 +197,7 @@ def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: 
         restart_baseline(state)
 
 
-@compiled()
+@compiled(inner=True)
 def judge(
     state: DetectorState, settings: Any, products: Records, identified: Records, plain: Records,
     phases: Array, poles: Complex, centres: Array, speed: float,

@@ -73,7 +73,7 @@ def mechanics_of(machine: Machine, low: float, high: float) -> Records:
     )
 
 
-@compiled()
+@compiled(inner=True)
 def forget(fit: Any) -> None:
     """Nothing known."""
     fit.cutting = fit.cutting_error = fit.stiffness = fit.stiffness_error = np.nan
@@ -81,7 +81,7 @@ def forget(fit: Any) -> None:
     fit.tool_power = fit.outputs = np.nan
 
 
-@compiled()
+@compiled(inner=True)
 def characteristic(
     mechanics: Any, cutting: float, stiffness: float, delay: float, s: complex
 ) -> tuple[complex, complex, complex, complex]:
@@ -98,7 +98,7 @@ def characteristic(
     return value, slope, (1.0 - echo) * both, tool + cutting * (1.0 - echo)
 
 
-@compiled()
+@compiled(inner=True)
 def root_near(
     mechanics: Any, cutting: float, stiffness: float, delay: float, guess: complex
 ) -> complex:
@@ -118,7 +118,7 @@ def root_near(
     return complex(np.nan, np.nan)
 
 
-@compiled()
+@compiled(inner=True)
 def rightmost_in_band(
     mechanics: Any, cutting: float, stiffness: float, delay: float, guess: complex
 ) -> complex:
@@ -138,7 +138,7 @@ def rightmost_in_band(
     return best if best.real == best.real else guess
 
 
-@compiled()
+@compiled(inner=True)
 def _at(row: Array, lag: float) -> float:
     """A correlation at a lag between samples."""
     middle = row.size // 2
@@ -150,7 +150,7 @@ def _at(row: Array, lag: float) -> float:
     return value
 
 
-@compiled()
+@compiled(inner=True)
 def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: Any) -> None:
     """What white noise of the thinned samples adds to the sums of one output.
 
@@ -171,7 +171,7 @@ def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: 
     noise.pull_workpiece = -workpiece * change
 
 
-@compiled()
+@compiled(inner=True)
 def _fit(
     cross: float, square: float, target: float, noise_cross: float, noise_square: float,
     count: float, usual: float,
@@ -199,7 +199,7 @@ def _fit(
     return slope, error, clear / square
 
 
-@compiled()
+@compiled(inner=True)
 def identify(
     products: Records, newest: int, lengths: Integers, mechanics: Any, noise: Any,
     delay: float, now: Any, total: Any, windows: Records,

@@ -103,19 +103,21 @@ def _interpolated(row: Array, index: int, x: float) -> float:
     return result
 
 
-@compiled()
+@compiled(inner=True)
 def _make_room(history: Array, counts: Any) -> None:
     """Forget the older half."""
     keep = history.shape[1] // 2
     shift = counts.filled - keep
-    history[:, :keep] = history[:, shift : shift + keep].copy()
+    for row in range(history.shape[0]):  # a slice of two dimensions takes 2 s more to compile
+        for column in range(keep):
+            history[row, column] = history[row, shift + column]
     counts.filled = keep
     counts.turn_before = max(counts.turn_before - shift, 0)
     counts.changes_from = max(counts.changes_from - shift, 0)
     counts.free_from = max(counts.free_from - shift, 0)
 
 
-@compiled()
+@compiled(inner=True)
 def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     """Fill in the changes over a turn of the newest thinned sample; whether there are any."""
     n = counts.filled - 1
@@ -151,7 +153,7 @@ def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     return True
 
 
-@compiled()
+@compiled(inner=True)
 def _take_phase(history: Array, n: int, phases: Array) -> None:
     """Note the relative motion where the spindle passes one of a few fixed angles."""
     now, before = PHASES * history[ANGLE, n], PHASES * history[ANGLE, n - 1]
@@ -172,7 +174,7 @@ def _take_phase(history: Array, n: int, phases: Array) -> None:
     phases[PHASE_SEEN, place] = seen + 1.0
 
 
-@compiled()
+@compiled(inner=True)
 def _take_products(
     history: Array, first: int, kernels: Kernels, settings: Any, products: Any, fit: FitSums
 ) -> None:
@@ -202,7 +204,7 @@ def _take_products(
         add_output(fit, force, slope, free, place, chip)
 
 
-@compiled()
+@compiled(inner=True)
 def clear(sums: Any) -> None:
     """All 0."""
     sums.force_force = sums.force_chip = sums.chip_chip = 0.0
@@ -211,7 +213,7 @@ def clear(sums: Any) -> None:
     sums.tool_noise = sums.workpiece_noise = 0.0
 
 
-@compiled()
+@compiled(inner=True)
 def add(total: Any, hop: Any) -> None:
     """Add what the fits need of a hop."""
     total.force_force += hop.force_force
@@ -224,7 +226,7 @@ def add(total: Any, hop: Any) -> None:
     total.outputs += hop.outputs
 
 
-@compiled()
+@compiled(inner=True)
 def _noise_of(block: Array, column: int) -> float:
     """Variance of the noise of single samples, from their third differences."""
     total = 0.0
@@ -235,7 +237,7 @@ def _noise_of(block: Array, column: int) -> float:
     return float(total / (20.0 * (block.shape[0] - 3)))
 
 
-@compiled()
+@compiled(inner=True)
 def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, products: Any) -> None:
     """Take in one hop of samples.
 

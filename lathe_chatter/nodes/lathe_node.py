@@ -35,7 +35,7 @@ from lathe_chatter.nodes.real_time import (
     spin_in_ticks,
 )
 from lathe_chatter.nodes.tick_statistics import FLOOD, TickStatistics
-from lathe_chatter.precompile import precompile
+from lathe_chatter.precompile import LATHE_LOOP, precompile
 
 _BUDGET = 5_000_000
 """ns of ticks, or of waiting for readers, after which requests have their turn."""
@@ -79,7 +79,8 @@ class LatheNode(ParameterNode):
             raise ParameterError('publish_clock', 'true', '', allowed)
         self._sample_rate: float = values['sample_rate']
         self._samples_per_tick = samples_per_tick(self._sample_rate, values['tick_rate'])
-        precompile()  # compiled before the first tick is due
+        # Before the first tick is due.
+        precompile(LATHE_LOOP, say=self.get_logger().info)
         self._lathe = recorded_config(values).lathe()
         self._pending: Cut | None = None
         self._knocks: list[float] = []

@@ -37,7 +37,7 @@ from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.real_time import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine
 from lathe_chatter.nodes.sample_stream import SampleBatch, SampleSubscription
-from lathe_chatter.precompile import precompile
+from lathe_chatter.precompile import DETECTOR_LOOP, precompile
 from lathe_chatter.samples.continuity import BlockOrder, Continuity, times_of
 
 _REST = 40_000_000
@@ -81,7 +81,8 @@ class MonitorNode(ParameterNode):
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
         self._log = BoundedLog(QuickLog(self.get_logger()))
-        precompile()  # compiled before the first sample comes
+        # Before the first sample comes.
+        precompile(DETECTOR_LOOP, say=self.get_logger().info)
         source = ModelSource(self.values['model'])
         self.machine: Machine | None = None
         if source is ModelSource.PARAMETERS:

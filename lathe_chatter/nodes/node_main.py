@@ -27,6 +27,7 @@ from lathe_chatter.nodes.deferred_signals import (
     ignore_end_signals,
     raise_on_end_signals,
 )
+from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.real_time import LOOK_UP
 
 try:
@@ -115,6 +116,8 @@ def run_node(
     begun = False
     try:
         _refuse_words(sys.argv if args is None else ['', *args], usage)
+        if logs := ensure_log_folder():
+            sys.stderr.write(f'{logs}\n')
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         # rclpy's own handlers would shut the context down under a callback that is publishing,

@@ -14,8 +14,8 @@ from typing import IO, NamedTuple
 from lathe_chatter.errors import LatheChatterError
 
 _END_TIMEOUT = 15.0
-"""s that a node has to finish what it does after SIGINT."""
-_ENDED_WELL = (0, -signal.SIGINT)
+"""s that a node has to finish what it does after SIGTERM."""
+_ENDED_WELL = (0, -signal.SIGTERM)
 """The latter of a node that was told to end while it was still being imported."""
 _SET_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
@@ -78,7 +78,9 @@ class ProcessGroup:
                 raise NodeFailedError(_last_words(name, process.returncode, output))
 
     def end(self) -> list[str]:
-        """End every node with SIGINT, the newest first, and wait for each.
+        """End every node with SIGTERM, the newest first, and wait for each.
+
+        SIGINT would not reach those whose parents ignore it, as under `nohup make run &`.
 
         Returns:
             A sentence for each node that did not end well.
@@ -87,7 +89,7 @@ class ProcessGroup:
         while self._members:
             name, process, output = self._members.pop()
             if process.poll() is None:
-                process.send_signal(signal.SIGINT)
+                process.terminate()
             try:
                 process.wait(_END_TIMEOUT)
             except subprocess.TimeoutExpired:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,10 +16,16 @@ from rclpy.signals import SignalHandlerOptions
 
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
+from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameters import MONITOR
 from lathe_chatter.nodes.process_group import ProcessGroup, RunFailedError
 from lathe_chatter.scenario import Scenario
+
+try:
+    from domain_coordinator import domain_id
+except ImportError:  # not every installation of ROS 2 has it
+    domain_id = None
 
 _START_PATIENCE = 60.0
 """s for the nodes to find each other: 20 where others keep the machine busy."""
@@ -66,8 +74,10 @@ def play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
         if name not in LATHE:
             raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
         LATHE[name].check(value)
+    if logs := ensure_log_folder():
+        screen.say(logs)
     try:
-        with DeferredSignals() as held:
+        with _free_domain(screen), DeferredSignals() as held:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             operator = Operator(scenario, tell=screen.say)
             executor = SingleThreadedExecutor()
@@ -86,6 +96,22 @@ def play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
                 rclpy.try_shutdown()
     except KeyboardInterrupt:  # while the nodes were ending: they have ended in order
         return True
+
+
+@contextmanager
+def _free_domain(screen: Screen) -> Iterator[None]:
+    """Take a ROS domain that no other run on this machine has, unless the user has chosen one."""
+    if os.environ.get('ROS_DOMAIN_ID') or domain_id is None:
+        yield
+        return
+    with domain_id(count().__next__) as number:
+        os.environ['ROS_DOMAIN_ID'] = str(number)
+        if number:
+            screen.say(f'Another run has the ROS domain 0: this one takes {number}.')
+        try:
+            yield
+        finally:
+            del os.environ['ROS_DOMAIN_ID']
 
 
 def _play(

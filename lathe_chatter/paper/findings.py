@@ -29,7 +29,7 @@ _EXPONENTS = range(-9, 12)
 _PER_DECADE = 20
 _DIGITS = 1e-7
 _LONGEST_FIGURE = 0.5
-_BEARING_SHARES = np.linspace(0.0, 2.0, 81)
+_BEARING_SHARES: Array = np.linspace(0.0, 2.0, 81, dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ class Continuity:
                 usual = _usual(rest)
                 if abs(usual - self.step) > 0.01 * self.step:  # a lathe of another sample rate
                     self.step = usual
-                    return place + 1
+                    return int(place) + 1
         return int(joined.size)
 
     def _order(

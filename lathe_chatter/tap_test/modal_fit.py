@@ -235,7 +235,7 @@ class _Fit:
         for _ in range(_ROUNDS):
             scale = np.ones(parameters.size)
             scale[-2:] = np.maximum(np.abs(parameters[-2:]), largest)
-            solved = least_squares(
+            solved = least_squares(  # type: ignore[operator]  # the stubs take a module of that name for it
                 self._residual,
                 parameters,
                 self._jacobian,

@@ -148,7 +148,7 @@ def test_an_interrupted_run_is_complete_up_to_then(
     number: signal.Signals, tmp_path: Path, environment: dict[str, str]
 ) -> None:
     scenario = tmp_path / 'short.yaml'
-    scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 600.0'))
+    scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 30.0'))
     output = tmp_path / 'run'
     with subprocess.Popen(
         command('--scenario', str(scenario), '--output', str(output)),
@@ -263,3 +263,30 @@ def test_a_lathe_that_is_there_already_is_left_alone(
     assert done.returncode == 2, done.stdout + done.stderr
     assert 'Another lathe is in this ROS domain already' in done.stderr
     assert 'depth_of_cut' not in said
+
+
+def test_two_runs_at_once_get_along_even_with_sigint_ignored(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    """Each takes a ROS domain of its own; nodes that cannot hear SIGINT are ended all the same."""
+    del environment['ROS_DOMAIN_ID']
+    scenario = tmp_path / 'short.yaml'
+    scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 1.0'))
+    runs = [
+        subprocess.Popen(
+            [
+                *('sh', '-c', 'trap "" INT; exec "$@"', 'sh'),
+                *command('--scenario', str(scenario), '--output', str(tmp_path / f'run {number}')),
+            ],
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        for number in range(2)
+    ]
+    said = [run.communicate(timeout=240)[0] for run in runs]
+    assert [run.returncode for run in runs] == [0, 0], said
+    assert any('this one takes' in each for each in said), said
+    for number in range(2):
+        assert (tmp_path / f'run {number}' / 'metadata.yaml').is_file()

@@ -1,0 +1,43 @@
+"""The executables of the nodes: where there is no ROS 2, they say so in a sentence."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+
+def lathe() -> None:
+    """Run the node `lathe`."""
+    _run('lathe_node')
+
+
+def chatter_monitor() -> None:
+    """Run the node `chatter_monitor`."""
+    _run('monitor_node')
+
+
+def run_recorder() -> None:
+    """Run the node `run_recorder`."""
+    _run('recorder_node')
+
+
+def cell() -> None:
+    """Run lathe, monitor and recorder in one process."""
+    _run('cell')
+
+
+def no_ros(error: ImportError) -> str:
+    """What to say where a package of ROS 2 cannot be imported."""
+    return (
+        f'ROS 2 is not there ({error}): source an installation, or use `make run`, which '
+        'installs what it needs.'
+    )
+
+
+def _run(module: str) -> None:
+    try:
+        node = import_module(f'lathe_chatter.nodes.{module}')
+    except ImportError as error:
+        sys.stderr.write(f'{no_ros(error)}\n')
+        raise SystemExit(2) from None
+    node.main()

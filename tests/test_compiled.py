@@ -1,0 +1,95 @@
+"""Where machine code is kept, and that nothing is done before it is needed."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lathe_chatter.compiled import _bases, compiled
+from lathe_chatter.precompile import precompile
+
+WATCH = """
+import os
+made = []
+import sys
+sys.addaudithook(lambda name, arguments: made.append(arguments) if name == 'os.mkdir' else None)
+"""
+
+
+def run(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, '-c', program],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_an_import_makes_no_folder(tmp_path: Path) -> None:
+    modules = 'lathe_chatter.lathe, lathe_chatter.detection, lathe_chatter.cli.main'
+    done = run(
+        f'{WATCH}\nimport {modules}\nassert not made, made', NUMBA_CACHE_DIR=str(tmp_path / 'new')
+    )
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / 'new').exists()
+
+
+def test_a_cache_that_cannot_be_written_is_made_elsewhere(tmp_path: Path) -> None:
+    """Here a file stands where the folder should be, which stops root too."""
+    obstacle = tmp_path / 'file'
+    obstacle.write_text('')
+    program = 'from lathe_chatter.compiled import _bases; print(*_bases(), sep="\\n")'
+    environment = {name: str(obstacle) for name in ('NUMBA_CACHE_DIR', 'XDG_CACHE_HOME')}
+    done = run(program, TMPDIR=str(tmp_path), **environment)
+    *_, last = done.stdout.splitlines()
+    assert last == str(tmp_path / f'lathe_chatter-{os.getuid()}')
+    assert stat.S_IMODE(Path(last).stat().st_mode) == 0o700
+    small = (
+        'import os\nfrom lathe_chatter.lathe.integrator.spindle import turned\n'
+        'print(turned(1.0, 50.0, 0.0, 0.0, 0.0, 0.0))'
+    )
+    done = run(small, TMPDIR=str(tmp_path), **environment)
+    assert done.returncode == 0, done.stderr
+    assert list(Path(last).rglob('*.nbi'))
+
+
+@pytest.mark.parametrize('kind', ['open to others', 'a link', 'of another user'])
+def test_a_cache_that_others_could_write_is_not_used(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('tempfile.tempdir', str(tmp_path))
+    folder = tmp_path / f'lathe_chatter-{os.getuid()}'
+    if kind == 'a link':
+        (tmp_path / 'theirs').mkdir()
+        folder.symlink_to(tmp_path / 'theirs')
+    else:
+        folder.mkdir(mode=0o700)
+        if kind == 'open to others':
+            folder.chmod(0o777)
+        elif os.getuid() == 0:
+            os.chown(folder, 65534, 65534)
+        else:
+            pytest.skip('only root can make a folder of another user')
+    assert folder not in list(_bases())
+
+
+def test_an_inner_function_refuses_a_call_from_python() -> None:
+    @compiled(inner=True)
+    def twice(value: float) -> float:
+        return 2.0 * value
+
+    with pytest.raises(TypeError, match='twice is called by compiled functions only'):
+        twice(1.0)
+
+
+def test_what_is_compiled_is_said_nothing_of() -> None:
+    precompile()
+    said: list[str] = []
+    precompile(say=said.append)
+    assert not said
