@@ -21,7 +21,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple, cast
 
 from lathe_chatter import LatheChatterError, read_run
 from lathe_chatter.cli.bench import this_machine
@@ -84,16 +84,16 @@ def first_sample(place: Path) -> list[Figure]:
         text=True,
         start_new_session=True,
     ) as run:
-        assert run.stdout is not None
-        first_word = run.stdout.readline()
+        said = cast('IO[str]', run.stdout)
+        first_word = said.readline()
         spoke = time.perf_counter() - began - installed
         while not has_samples(output) and time.perf_counter() - began < PATIENCE:
             if run.poll() is not None:
-                raise SystemExit(first_word + run.stdout.read())
+                raise SystemExit(first_word + said.read())
             time.sleep(0.1)
         whole = time.perf_counter() - began
         os.killpg(run.pid, signal.SIGTERM)
-        run.stdout.read()
+        said.read()
     return [
         Figure('installing: processor time', installing, 's'),
         Figure('installing: by the clock', installed, 's'),
@@ -105,9 +105,9 @@ def first_sample(place: Path) -> list[Figure]:
 def has_samples(output: Path) -> bool:
     """Whether a run that is being recorded has samples of a lathe."""
     try:
-        with read_run(output, damaged=True) as run:
-            topics = [name for name in run.topics if name.endswith('/samples')]
-            return bool(topics) and any(True for _ in run.raw_messages(*topics))
+        run = read_run(output, damaged=True)
+        topics = [name for name in run.topics if name.endswith('/samples')]
+        return bool(topics) and any(True for _ in run.raw_messages(*topics))
     except (LatheChatterError, OSError):
         return False
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -129,7 +129,7 @@ def to_mat(
                     'choose a range of time, or HDF5.'
                 )
         signals = {n: np.concatenate([p[:, k] for p in kept]) for k, n in enumerate(parts.names)}
-        facts = {
+        facts: dict[str, Any] = {
             'units': {name: UNITS.get(name, '') for name in parts.names},
             'gaps': np.reshape(parts.continuity.gap_places, (-1, 2)),
             'restarts': np.reshape(parts.continuity.restart_places, (-1, 2)),

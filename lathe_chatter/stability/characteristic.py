@@ -220,9 +220,9 @@ def machine_array(machines: Machines) -> NDArray[np.object_]:
         ParameterError: If something among them is no machine.
     """
     if isinstance(machines, Machine):
-        given = np.empty((), object)
-        given[()] = machines
-        return given
+        one: NDArray[np.object_] = np.empty((), object)
+        one[()] = machines
+        return one
     given = np.asarray(machines, object)
     wrong = next((each for each in given.ravel() if not isinstance(each, Machine)), None)
     if wrong is not None:

@@ -37,7 +37,7 @@ def dominant_eigenvalue(
     """
     size = len(start)
     most = min(size, _MOST_STEPS)
-    basis = np.zeros((min(most, 32) + 1, size))
+    basis: Array = np.zeros((min(most, 32) + 1, size))
     projected = np.zeros((most + 1, most))
     basis[0] = start / math.sqrt(_square(start))
     for k in range(most):
