@@ -118,10 +118,11 @@ def __getattr__(name: str) -> Any:
     if name == '__version__':  # package.xml has it, and what is installed has it from there
         from importlib.metadata import version
 
-        return version(__name__)
-    if name not in _HOME:
+        value = version(__name__)
+    elif name in _HOME:
+        value = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)
+    else:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)
     globals()[name] = value
     return value
 

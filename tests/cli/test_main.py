@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -126,7 +127,8 @@ def test_an_interrupt_while_libraries_are_loaded_is_no_traceback(tmp_path: Path)
 
 
 def test_a_reader_that_has_enough_is_no_mistake(tmp_path: Path) -> None:
-    call = f'{sys.executable} -m lathe_chatter.cli simulate --duration 0.2 --output {tmp_path}/run'
+    words = [sys.executable, '-m', 'lathe_chatter.cli', 'simulate', '--duration', '0.2']
+    call = shlex.join([*words, '--output', str(tmp_path / 'run')])
     done = subprocess.run(
         ['bash', '-c', f'{call} --json | true; echo "${{PIPESTATUS[0]}}"'],
         capture_output=True,
