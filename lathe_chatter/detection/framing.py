@@ -80,7 +80,8 @@ class Framer:
         self._last = math.nan
         self._dead: NDArray[np.bool_] = np.zeros(4, bool)
         self._names: tuple[str, ...] = ()
-        self._places, self._incomplete = np.full(5, -1), False
+        self._places: NDArray[np.int64] = np.full(5, -1)
+        self._incomplete = False
         self._newest, self.blind = math.nan, False
         self._channels = new_channels()
 

@@ -128,7 +128,10 @@ def to_mat(
                     f'{run.path} has more samples than a MAT file can hold, {_MOST_IN_MAT}: '
                     'choose a range of time, or HDF5.'
                 )
-        signals = {n: np.concatenate([p[:, k] for p in kept]) for k, n in enumerate(parts.names)}
+        signals: dict[str, Any] = {
+            name: np.concatenate([part[:, k] for part in kept])
+            for k, name in enumerate(parts.names)
+        }
         facts: dict[str, Any] = {
             'units': {name: UNITS.get(name, '') for name in parts.names},
             'gaps': np.reshape(parts.continuity.gap_places, (-1, 2)),
