@@ -1,14 +1,17 @@
 """The nodes' figures on this machine: CPU, lateness of the ticks, delay of a parameter.
 
-    python benchmarks/nodes [--seconds 60] [cpu] [lateness] [parameter] [lathes] [requests]
+    python benchmarks/nodes [--seconds 60] [cpu] [lateness] [parameter] [lathes]
+    python benchmarks/nodes [--seconds 60] [requests] [factor]
     python benchmarks/nodes [--simulated 3600] hour
     python benchmarks/nodes [--repeats 200] repeats
+    python benchmarks/nodes [--minutes 40] [--seed 1] chaos
 
 Everything is measured from outside, on the real nodes over real DDS: CPU from the kernel's
 accounts of the processes, lateness from the time at which DDS was handed each block of samples,
 losses from the times in the payload. Lateness is counted from the earliest in a hundred ticks:
 the tick after one that came late may be made up to half a period early, which is told too.
-`hour` and `repeats` (of all node tests, two at a time beside a burner) only run if asked for.
+`hour`, `repeats` (of all node tests, two at a time beside a burner) and `chaos` (kills, stops,
+floods and jumps of /clock at random) only run if asked for.
 """
 
 from __future__ import annotations
@@ -24,6 +27,8 @@ import domain_coordinator
 import figures
 import rclpy
 from answers import measure_requests
+from chaos import measure_chaos
+from factor import measure_factor
 from processes import machine
 from repeats import repeats
 
@@ -34,11 +39,13 @@ FIGURES: dict[str, Callable[[Any], None]] = {
     'lateness': lambda options: figures.measure_lateness(options.seconds),
     'parameter': lambda _options: figures.measure_parameter(),
     'lathes': lambda options: figures.measure_lathes(options.seconds),
+    'factor': lambda options: measure_factor(options.seconds / 6.0),
     'requests': lambda options: measure_requests(options.seconds / 6.0),
 }
 LONG: dict[str, Callable[[Any], None]] = {
     'hour': lambda options: figures.measure_hour(options.simulated),
     'repeats': lambda options: repeats(options.repeats),
+    'chaos': lambda options: measure_chaos(options.minutes, options.seed),
 }
 
 
@@ -53,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--seconds', type=float, default=60.0, help='of each measurement')
     parser.add_argument('--simulated', type=float, default=3600.0, help='seconds of the hour')
     parser.add_argument('--repeats', type=int, default=200, help='of the node tests')
+    parser.add_argument('--minutes', type=float, default=40.0, help='of the chaos')
+    parser.add_argument('--seed', type=int, default=1, help='of the chaos')
     parser.add_argument('figures', nargs='*', help=', '.join(known), metavar='figure')
     options = parser.parse_args(arguments)
     unknown = set(options.figures) - set(known)

@@ -107,7 +107,7 @@ class MonitorNode(ParameterNode):
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
         self._state_publisher = self._publisher(String, 'state', _LATCHED)
         self._figure_publishers = {
-            name: self._publisher(Float64, name, QoSProfile(depth=10)) for name in _FIGURES
+            name: self._publisher(Float64, name, QoSProfile(depth=1000)) for name in _FIGURES
         }
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))

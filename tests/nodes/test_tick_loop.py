@@ -10,12 +10,13 @@ import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 from support.node_bench import messages_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.node_main import make_executor
-from lathe_chatter.nodes.real_time import spin_in_ticks
+from lathe_chatter.nodes.real_time import Served, spin_in_ticks
 
 PATIENCE = 60.0
 
@@ -59,3 +60,27 @@ def test_requests_are_served_between_ticks_and_in_a_pause(lathe: LatheNode, fact
     resumed = pause.call_async(SetBool.Request(data=False))
     spin_until(lathe, resumed.done)
     spin_until(lathe, lambda: lathe.samples_taken > now)
+
+
+def test_where_ticks_leave_no_time_requests_have_as_much_as_the_ticks(lathe: LatheNode) -> None:
+    knock = lathe.create_publisher(Float64, '~/knock', 100)
+    spin_until(lathe, lambda: knock.get_subscription_count() == 1)
+    executor = make_executor(lathe)
+    executor.add_node(lathe)
+    served = Served(executor, lathe, serve_period=0)
+    try:
+        for expected in (100, 200):
+            for _ in range(100):
+                knock.publish(Float64(data=1e-6))
+            time.sleep(0.5)  # DDS has them by then; more time does no harm
+            before, goes = lathe.requests.served, 0
+            while lathe.requests.served < before + 100:
+                # Ticks that took a second each, and are due again at once.
+                served._spent = int(1e9)
+                served.serve(until=0)
+                goes += 1
+                assert goes < 10, f'{lathe.requests.served - before} of 100 served'
+            assert lathe.requests.served >= expected
+    finally:
+        executor.remove_node(lathe)
+        executor.shutdown()
