@@ -195,7 +195,7 @@ def _judge(nodes: Nodes, minutes: float) -> None:
     done = ', '.join(f'{count} {name}' for name, count in sorted(nodes.done.items()))
     print(
         f'{minutes:.1f} min of chaos: {done}; {len(nodes.finished)} runs finished and '
-        f'{len(nodes.killed)} cut short; {missing} samples are missing in the former, each told once'
+        f'{len(nodes.killed)} cut short; {missing} samples missing in the former, each told once'
     )
     if nodes.faults:
         sys.exit('\n'.join(nodes.faults))
