@@ -165,7 +165,7 @@ class RecorderNode(ParameterNode):
         self._clock_watch, self._flags = ClockWatch(), 0
         self._left_out = 0
         self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
-        self._parameters = RemoteParameters(self, self._note_parameters)
+        self._remote = RemoteParameters(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
         sink.note(IDENTITY, {**identity(), 'middleware': middleware})
         for name in values['attachments']:
@@ -274,8 +274,8 @@ class RecorderNode(ParameterNode):
     def _look(self) -> None:
         """Follow the graph: topics and nodes that have appeared."""
         if self._watch is not None and (self._writer or self._snapshot is not None):
-            self._watch.look(self._parameters.want)
-            self._parameters.look()
+            self._watch.look(self._remote.want)
+            self._remote.look()
 
     def _take(self) -> None:
         """Take what has arrived."""
@@ -341,7 +341,7 @@ class RecorderNode(ParameterNode):
         """Say from when there are samples, and where they are missing."""
         for topic, received in self._log.samples.items():
             if any(each.order is BlockOrder.RESTART for each in received.discontinuities):
-                self._parameters.want_again(topic.removesuffix('/samples'))
+                self._remote.want_again(topic.removesuffix('/samples'))
         now = time.monotonic()
         if last or now > self._next_news:
             sentences = [*news(self._log)]
