@@ -20,13 +20,13 @@ from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_pe
 from lathe_chatter.nodes import control, simulation_services
 from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
 from lathe_chatter.nodes.control import Answer, RunControl, RunState
-from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.diagnostics import Diagnostics, Status
+from lathe_chatter.nodes.graph_watch import ClockWatch, PublisherWatch
 from lathe_chatter.nodes.lathe_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.polled_subscription import publisher_names
 from lathe_chatter.nodes.real_time import (
     SECOND,
     Pacer,
@@ -44,8 +44,6 @@ _READERS_PATIENCE = 100_000_000
 it waits for nobody."""
 _MAX_KNOCKS = 1000
 """Knocks between two ticks; they come one after the other, and are applied together."""
-_CLOCK_STOPPED = 2.0
-"""s after which a /clock that shows the same time stands still."""
 _LOOK_FOR_READERS = 5_000_000
 """ns from one look to the next for the readers that it waits for."""
 
@@ -99,8 +97,8 @@ class LatheNode(ParameterNode):
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
         self._wait_until = 0
-        self._on_topic: list[str] = []
-        self._clock_seen, self._clock_stands = (0, 0.0), False
+        self._others = PublisherWatch(self, self._log)
+        self._clock_watch = ClockWatch(self._log)
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
@@ -317,8 +315,7 @@ class LatheNode(ParameterNode):
 
     def pause(self, *, pause: bool) -> Answer:
         """Pause, or go on from where it was paused with nothing to catch up."""
-        before = self._control.state
-        self._awaited = 0
+        before, self._awaited = self._control.state, 0
         answer = self._control.pause(pause=pause)
         if self._control.state is not before:
             self._start_clock()
@@ -350,8 +347,9 @@ class LatheNode(ParameterNode):
     # -- diagnostics -----------------------------------------------------------------------
 
     def _report(self) -> None:
-        self._watch_clock()
-        self._watch_publishers()
+        if self._follows:
+            self._clock_watch.look(self._now())
+        self._others.look()
         share = self._meter.requests_share
         if share > FLOOD:
             self._log.warning(
@@ -377,26 +375,9 @@ class LatheNode(ParameterNode):
                 scheduling=self._real_time.word,
             ),
             self._meter.cutting(self._control, self._lathe),
-            self._samples_status(),
+            self._others.status(self._topics.readers()),
             *self._record.statuses(),
         ]
-
-    def _samples_status(self) -> Status:
-        """Whether the samples on the topic are all of this node."""
-        values = {'publishers': ', '.join(self._on_topic), 'readers': self._topics.readers()}
-        if len(self._on_topic) > 1:
-            return Status('samples', WARN, 'not the only lathe on the topic', values)
-        return Status('samples', OK, 'published', values)
-
-    def _watch_publishers(self) -> None:
-        """See who else publishes samples on this topic, and say it once."""
-        before, self._on_topic = self._on_topic, publisher_names(self, '~/samples')
-        if len(self._on_topic) > max(1, len(before)):
-            self._log.warning(
-                f'I am not the only one that publishes {self.resolve_topic_name("~/samples")}: '
-                f'{" and ".join(self._on_topic)} do, and readers cannot tell them apart.',
-                'publishers',
-            )
 
     def _clock_complaint(self) -> str:
         """What is wrong with /clock, where this node drives or follows it."""
@@ -405,27 +386,9 @@ class LatheNode(ParameterNode):
             return 'waiting for /clock'
         if (self._follows or self.values['publish_clock']) and owners > 1:
             return f'{owners} nodes publish /clock: it must have one owner'
-        if self._clock_stands:
+        if self._clock_watch.stands:
             return '/clock stands still'
         return ''
-
-    def _watch_clock(self) -> None:
-        """See whether a /clock that is followed goes on; called once a second."""
-        if not self._follows:
-            return
-        now, at = self._now(), time.monotonic()
-        if now != self._clock_seen[0]:
-            self._clock_seen, stands = (now, at), False
-        else:
-            stands = at - self._clock_seen[1] >= _CLOCK_STOPPED
-        if stands and not self._clock_stands and now:
-            self._log.warning(
-                f'/clock stands still at {now / SECOND:.3f} s, and the cut with it.',
-                'clock stands',
-            )
-        elif self._clock_stands and not stands:
-            self._log.info(f'/clock goes on at {now / SECOND:.3f} s.', 'clock goes on')
-        self._clock_stands = stands
 
 
 def main() -> None:

@@ -34,14 +34,6 @@ SAID = {
             'the /clock that is followed has shown the same time for 2 s',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
         ),
-        '/clock stands still at {} s, and the cut with it.': (
-            'the same; told once each time that it stops',
-            f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
-        ),
-        '/clock goes on at {} s.': (
-            'it was told that it stands still, and it has shown another time since',
-            f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
-        ),
         '/clock went back by {} s to {} s: the cut goes on from there.': (
             'it shows a time before that of the last tick',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
@@ -69,14 +61,6 @@ SAID = {
             'so many were kept for the next tick, and another came',
             f'{LATHE}::test_a_flood_of_knocks_is_bounded_and_told',
         ),
-        'not the only lathe on the topic': (
-            'the graph has another publisher of ~/samples',
-            f'{LATHE}::test_a_second_lathe_on_the_topic_is_named',
-        ),
-        'I am not the only one that publishes {}: {} do, and readers cannot tell them apart.': (
-            'the same; told once for each that comes',
-            f'{LATHE}::test_a_second_lathe_on_the_topic_is_named',
-        ),
         'Now at {} s.': (
             'the ticks of the step were made, and the lathe is at that time',
             f'{CLOCK}::test_how_far_the_clock_is_caught_up_with_can_be_chosen',
@@ -84,6 +68,24 @@ SAID = {
         'false under use_sim_time, for /clock has one owner': (
             'publish_clock and use_sim_time were both asked for; the node does not start',
             f'{LATHE}::test_it_cannot_drive_the_clock_that_it_follows',
+        ),
+    },
+    'graph_watch.py': {
+        '/clock stands still at {} s, and the cut with it.': (
+            'the same; told once each time that it stops',
+            f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
+        ),
+        '/clock goes on at {} s.': (
+            'it was told that it stands still, and it has shown another time since',
+            f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
+        ),
+        'not the only lathe on the topic': (
+            'the graph has another publisher of ~/samples',
+            f'{LATHE}::test_a_second_lathe_on_the_topic_is_named',
+        ),
+        'I am not the only one that publishes {}: {} do, and readers cannot tell them apart.': (
+            'the same; told once for each that comes',
+            f'{LATHE}::test_a_second_lathe_on_the_topic_is_named',
         ),
     },
     'tick_statistics.py': {
