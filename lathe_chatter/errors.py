@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 
 class LatheChatterError(Exception):
@@ -49,6 +50,87 @@ class MachineFileError(LatheChatterError, ValueError):
 
 class KnockMapError(LatheChatterError):
     """A file that is no map of knocks, or not the one wanted."""
+
+
+class RunReadError(LatheChatterError):
+    """A path that holds no run that can be read; the text says why."""
+
+
+class RunExistsError(LatheChatterError):
+    """The folder of a new run exists already: nothing recorded is ever overwritten."""
+
+    def __init__(self, folder: Path) -> None:
+        """Name the folder."""
+        self.folder = folder
+        super().__init__(f'{folder} exists already, and no recorded run is overwritten.')
+
+
+class DiskFullError(LatheChatterError):
+    """The disk has too little room left to go on."""
+
+    def __init__(self, folder: Path, free: int, wanted: int) -> None:
+        """Name the folder, what is free on its disk and what must be, in bytes."""
+        self.folder = folder
+        super().__init__(
+            f'The disk of {folder} has {free / 1e6:.1f} MB left and {wanted / 1e6:.1f} MB must '
+            'stay free: the recording ends, complete up to here.'
+        )
+
+
+class ReplayError(LatheChatterError):
+    """Something without which the samples cannot be computed; the text says what."""
+
+
+class ExportExistsError(LatheChatterError):
+    """A file that is there already: nothing is overwritten."""
+
+    def __init__(self, path: Path) -> None:
+        """Name the file."""
+        super().__init__(f'{path} exists already, and no file is overwritten.')
+
+
+class MissingPackageError(LatheChatterError):
+    """A library that is not installed; the text says how to have it."""
+
+    def __init__(self, name: str, use: str) -> None:
+        """Name the library and what for."""
+        super().__init__(f'{use} needs {name}, which is not installed: `pip install {name}`.')
+
+
+class FrequencyResponseError(LatheChatterError, ValueError):
+    """A file that holds no frequency response that can be used, and why."""
+
+
+class ModalFitError(LatheChatterError, ValueError):
+    """Frequency responses to which no modes can be fitted, and why."""
+
+
+class RunFailedError(LatheChatterError):
+    """The run could not be made; the text says why."""
+
+
+class NodeFailedError(LatheChatterError):
+    """A node of the cell ended by itself; the text holds what it said last."""
+
+
+class ScenarioFailedError(LatheChatterError):
+    """The lathe refused a step of the scenario; the text says which and why."""
+
+
+class StartError(LatheChatterError):
+    """A command line that a node does not understand."""
+
+
+class UnknownParameterError(LatheChatterError):
+    """A misspelt name given at the start: the default would be taken, and nobody notice."""
+
+
+class RecordingFailedError(LatheChatterError):
+    """The disk took no more: the run ends with what it has, and so does the node."""
+
+
+class OutputError(LatheChatterError):
+    """A file or folder that cannot be written, or that would be lost by writing it."""
 
 
 def reason_of(error: OSError) -> str:

@@ -164,12 +164,13 @@ print(len(functions), *(f.__name__ for f in functions.values() if f.signatures))
 
 
 def test_no_work_at_import(tmp_path: Path) -> None:
-    """No compiled function is called."""
+    """No file is made, and no compiled function called."""
     home = tmp_path / 'home'
     home.mkdir()
     count, *called = in_a_fresh_interpreter(IMPORT_ALL, home).split()
     assert int(count) > 20
     assert not called
+    assert not [*home.rglob('*')]
 
 
 CORE = """

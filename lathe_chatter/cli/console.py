@@ -34,7 +34,7 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from lathe_chatter.errors import LatheChatterError, reason_of
+from lathe_chatter.errors import OutputError, reason_of
 from lathe_chatter.precompile import precompile
 
 INTERRUPTED = 130
@@ -43,10 +43,6 @@ _ANY = 10_000
 """Columns that no table needs."""
 _NARROW = 60
 """Columns of a terminal below which a bar of progress shows no times."""
-
-
-class OutputError(LatheChatterError):
-    """A file or folder that cannot be written, or that would be lost by writing it."""
 
 
 class Screen:

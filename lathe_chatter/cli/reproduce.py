@@ -15,14 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from lathe_chatter.cli.common_options import add_force, add_json
-from lathe_chatter.cli.console import (
-    INTERRUPTED,
-    OutputError,
-    Screen,
-    keep_existing,
-    plain,
-    writing,
-)
+from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, plain, writing
+from lathe_chatter.errors import OutputError
 from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
 from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
 from lathe_chatter.paper.overview import draw_conditions, draw_findings, draw_growth

@@ -11,11 +11,10 @@ from pathlib import Path
 from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verdict
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
+from lathe_chatter.errors import RunFailedError, RunReadError
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.entry_points import no_ros
-from lathe_chatter.nodes.process_group import RunFailedError
 from lathe_chatter.recording import read_run
-from lathe_chatter.recording.run import RunReadError
 from lathe_chatter.report.history import read_history
 from lathe_chatter.scenario import (
     CLEARED,

@@ -15,12 +15,13 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.executors import Executor
 
+from lathe_chatter.errors import RecordingFailedError
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.node_main import make_executor, run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.real_time import Served, ask_for_short_slices, spin_together
-from lathe_chatter.nodes.recorder_node import RecorderNode, RecordingFailedError
+from lathe_chatter.nodes.recorder_node import RecorderNode
 
 USAGE = """usage: cell [--ros-args -p NODE:PARAMETER:=VALUE ...]
 

@@ -21,7 +21,7 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, StartError
 from lathe_chatter.nodes.deferred_signals import (
     DeferredSignals,
     ignore_end_signals,
@@ -81,10 +81,6 @@ _START_ERRORS = (
     RuntimeError,  # rcl's: arguments that are no ROS arguments
     OSError,
 )
-
-
-class StartError(LatheChatterError):
-    """A command line that a node does not understand."""
 
 
 def run_node(

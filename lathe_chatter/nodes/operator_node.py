@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import ScenarioFailedError
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step
 from lathe_chatter.scenario.player import ScenarioPlayer
@@ -23,10 +23,6 @@ from lathe_chatter.scenario.player import ScenarioPlayer
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
-
-
-class ScenarioFailedError(LatheChatterError):
-    """The lathe refused a step of the scenario; the text says which and why."""
 
 
 class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on Jazzy

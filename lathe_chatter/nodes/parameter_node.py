@@ -16,7 +16,7 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.errors import ParameterError, UnknownParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 from lathe_chatter.nodes.real_time import RequestLoad
@@ -24,10 +24,6 @@ from lathe_chatter.nodes.real_time import RequestLoad
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 _OF_QOS = 'qos_overrides.'
 _SET_SERVICES = (SetParameters, SetParametersAtomically)
-
-
-class UnknownParameterError(LatheChatterError):
-    """A misspelt name given at the start: the default would be taken, and nobody notice."""
 
 
 class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type information

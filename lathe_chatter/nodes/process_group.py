@@ -11,21 +11,13 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import IO, NamedTuple
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import NodeFailedError
 
 _END_TIMEOUT = 15.0
 """s that a node has to finish what it does after SIGTERM."""
 _ENDED_WELL = (0, -signal.SIGTERM)
 """The latter of a node that was told to end while it was still being imported."""
 _SET_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
-
-
-class RunFailedError(LatheChatterError):
-    """The run could not be made; the text says why."""
-
-
-class NodeFailedError(LatheChatterError):
-    """A node of the cell ended by itself; the text holds what it said last."""
 
 
 class _Member(NamedTuple):

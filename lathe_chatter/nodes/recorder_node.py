@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from lathe_chatter.errors import LatheChatterError, reason_of
+from lathe_chatter.errors import LatheChatterError, RecordingFailedError, reason_of
 from lathe_chatter.nodes import recorder_services
 from lathe_chatter.nodes.control import Answer
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
@@ -51,10 +51,6 @@ _NEWS_PERIOD = 10.0
 _FAILED = 1
 
 _NOTHING = Answer(done=False, message='Nothing is being recorded.')
-
-
-class RecordingFailedError(LatheChatterError):
-    """The disk took no more: the run ends with what it has, and so does the node."""
 
 
 class RecorderNode(ParameterNode):

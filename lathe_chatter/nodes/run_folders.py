@@ -8,9 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lathe_chatter.errors import LatheChatterError, reason_of
+from lathe_chatter.errors import LatheChatterError, RunExistsError, reason_of
 from lathe_chatter.recording.mcap_chunk import Compression
-from lathe_chatter.recording.split_files import RunExistsError
 
 _Made = TypeVar('_Made')
 

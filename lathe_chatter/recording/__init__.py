@@ -1,10 +1,11 @@
 """A run on disk: a rosbag2 folder of MCAP files that open whatever happened to their writer."""
 
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.recording.lathe_run import LatheRun
 from lathe_chatter.recording.recover import Recovery, recover
 from lathe_chatter.recording.replay import Difference
 from lathe_chatter.recording.resimulate import Resimulation, resimulate
-from lathe_chatter.recording.run import Run, RunReadError, Samples, read_run
+from lathe_chatter.recording.run import Run, Samples, read_run
 from lathe_chatter.recording.verify import Finding, Verification, verify
 from lathe_chatter.recording.writer import RunWriter, Topic
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.recording.metadata import FILE_NAME
 
 _NUMBERED = re.compile(r'^(?P<run>.*)_(?P<number>\d+)$')
@@ -23,10 +23,6 @@ _OTHER_FORMATS = {
 """What files begin with that hold recorded messages in another way."""
 _UNREADABLE = (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError)
 """What reading a metadata.yaml raises that is not there, or is no such thing."""
-
-
-class RunReadError(LatheChatterError):
-    """A path that holds no run that can be read; the text says why."""
 
 
 class RunFolder(NamedTuple):

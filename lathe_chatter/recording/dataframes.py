@@ -5,18 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import MissingPackageError
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Samples
 from lathe_chatter.samples.columns import UNITS
-
-
-class MissingPackageError(LatheChatterError):
-    """A library that is not installed; the text says how to have it."""
-
-    def __init__(self, name: str, use: str) -> None:
-        """Name the library and what for."""
-        super().__init__(f'{use} needs {name}, which is not installed: `pip install {name}`.')
 
 
 def optional(name: str, use: str) -> Any:

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError
 from lathe_chatter.recording.dataframes import optional
-from lathe_chatter.recording.run import Run, RunReadError
+from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.samples.columns import UNITS
@@ -28,14 +28,6 @@ _MOST_IN_MAT = 2**28 - 1
 
 Progress = Callable[[int], None]
 """Told how many samples have been written since it was told last."""
-
-
-class ExportExistsError(LatheChatterError):
-    """A file that is there already: nothing is overwritten."""
-
-    def __init__(self, path: Path) -> None:
-        """Name the file."""
-        super().__init__(f'{path} exists already, and no file is overwritten.')
 
 
 class Exported(NamedTuple):

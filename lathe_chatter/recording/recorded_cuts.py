@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.recording.cut_log import CutLog, CutSession, Parameters, logger_of
 from lathe_chatter.recording.decoding import decoded
 from lathe_chatter.recording.provenance import PARAMETERS, parameter_history
-from lathe_chatter.recording.run import Run, RunReadError
+from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import Placed, Timeline, read_timeline
 
 _LOG, _EVENTS = '/rosout', '/parameter_events'

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import ReplayError
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.cut_events import BEGINNING, Change, Knock
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
@@ -35,10 +35,6 @@ class Difference(NamedTuple):
     column: str
     recorded: float
     computed: float
-
-
-class ReplayError(LatheChatterError):
-    """Something without which the samples cannot be computed; the text says what."""
 
 
 class Replay:

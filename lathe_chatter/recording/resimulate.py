@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lathe_chatter.errors import LayoutError, ParameterError
+from lathe_chatter.errors import LayoutError, ParameterError, ReplayError, RunReadError
 from lathe_chatter.recording.cut_log import CutSession
 from lathe_chatter.recording.provenance import (
     IDENTITY,
@@ -22,8 +22,8 @@ from lathe_chatter.recording.provenance import (
     noted_number,
 )
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, recorded_cuts
-from lathe_chatter.recording.replay import Difference, Replay, ReplayError
-from lathe_chatter.recording.run import Run, RunReadError
+from lathe_chatter.recording.replay import Difference, Replay
+from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_reader import SampleBlocks
 from lathe_chatter.recording.verify import Finding

@@ -11,13 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mcap.writer import MCAP0_MAGIC
 
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.html_table import html_table
-from lathe_chatter.recording.bag_folder import (
-    RunFolder,
-    RunReadError,
-    refuse_other_format,
-    run_folder,
-)
+from lathe_chatter.recording.bag_folder import RunFolder, refuse_other_format, run_folder
 from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.decoding import Recorded, decoded
 from lathe_chatter.recording.mcap_reader import Damage

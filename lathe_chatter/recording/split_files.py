@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from mcap.records import Channel, Schema
 
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import DiskFullError, RunExistsError
 from lathe_chatter.recording.disk_thread import FileSync
 from lathe_chatter.recording.mcap_chunk import Compression, OpenChunk, record_bytes
 from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
@@ -31,27 +31,6 @@ CLOSED = 'lathe_chatter/closed'
 
 `next` is the file in which the run goes on, empty in the last; `messages` the counts by topic so
 far, as JSON."""
-
-
-class RunExistsError(LatheChatterError):
-    """The folder of a new run exists already: nothing recorded is ever overwritten."""
-
-    def __init__(self, folder: Path) -> None:
-        """Name the folder."""
-        self.folder = folder
-        super().__init__(f'{folder} exists already, and no recorded run is overwritten.')
-
-
-class DiskFullError(LatheChatterError):
-    """The disk has too little room left to go on."""
-
-    def __init__(self, folder: Path, free: int, wanted: int) -> None:
-        """Name the folder, what is free on its disk and what must be, in bytes."""
-        self.folder = folder
-        super().__init__(
-            f'The disk of {folder} has {free / 1e6:.1f} MB left and {wanted / 1e6:.1f} MB must '
-            'stay free: the recording ends, complete up to here.'
-        )
 
 
 class TopicRecords(NamedTuple):

@@ -9,16 +9,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
+from lathe_chatter.errors import DiskFullError, RunExistsError
 from lathe_chatter.recording.disk_thread import DiskThread
 from lathe_chatter.recording.mcap_chunk import Compression, OpenChunk
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.split_files import (
-    CLOSED,
-    DiskFullError,
-    RunExistsError,
-    RunFiles,
-    TopicTable,
-)
+from lathe_chatter.recording.split_files import CLOSED, RunFiles, TopicTable
 from lathe_chatter.recording.unfinished_counts import UnfinishedCounts
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']

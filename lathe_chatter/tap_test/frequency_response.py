@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.errors import LatheChatterError, reason_of
+from lathe_chatter.errors import FrequencyResponseError, reason_of
 
 Complex = NDArray[np.complex128]
 
@@ -37,10 +37,6 @@ _FORCES = {'n': 1.0, 'kn': 1e3, 'lbf': 4.4482216152605}
 _UFF_ORDERS = {8: 0, 11: 1, 12: 2}
 """Specific data types of dataset 58: displacement, velocity, acceleration."""
 _UFF_FORCE, _UFF_FRF, _UFF_COHERENCE = 13, 4, 6
-
-
-class FrequencyResponseError(LatheChatterError, ValueError):
-    """A file that holds no frequency response that can be used, and why."""
 
 
 @dataclass(frozen=True)

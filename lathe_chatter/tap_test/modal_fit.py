@@ -26,7 +26,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import ModalFitError
 from lathe_chatter.tap_test.frequency_response import Complex, FrequencyResponse
 
 MOST_MODES = 8
@@ -36,10 +36,6 @@ _AGREEING = 5
 _MOST_CALLS = 200
 _ROUNDS = 3
 """Of fitting and weighing in turn; the weights settle in two or three."""
-
-
-class ModalFitError(LatheChatterError, ValueError):
-    """Frequency responses to which no modes can be fitted, and why."""
 
 
 @dataclass(frozen=True)

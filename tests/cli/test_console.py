@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from support.recorded import number, topic
 
-from lathe_chatter.cli.console import OutputError, Screen, plain, writing
+from lathe_chatter.cli.console import Screen, plain, writing
 from lathe_chatter.cli.main import main
+from lathe_chatter.errors import OutputError
 from lathe_chatter.recording import RunWriter
 
 MARKUP = 'a [bold] b [/red] [/] :smile: \\[x]'

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from lathe_chatter.errors import NodeFailedError
 from lathe_chatter.nodes import process_group
-from lathe_chatter.nodes.process_group import NodeFailedError, ProcessGroup
+from lathe_chatter.nodes.process_group import ProcessGroup
 
 
 def module(folder: Path, monkeypatch: pytest.MonkeyPatch, program: str) -> str:

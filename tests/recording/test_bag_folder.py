@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from support.recorded import number, topic
 
-from lathe_chatter.recording import RunReadError, RunWriter, read_run, recover, verify
+from lathe_chatter.errors import RunReadError
+from lathe_chatter.recording import RunWriter, read_run, recover, verify
 
 START = 1_700_000_000_000_000_000
 PIECES = 4

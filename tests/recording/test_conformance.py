@@ -10,7 +10,8 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from support.conformance import KINDS, MAGIC, Data, variants
 
-from lathe_chatter.recording import RunReadError, read_run, recover, verify
+from lathe_chatter.errors import RunReadError
+from lathe_chatter.recording import read_run, recover, verify
 
 FILES = [*variants()]
 

@@ -14,8 +14,9 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from support.recorded import ARRAY, STORE, block, number, topic
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.recording import RunReadError, RunWriter, read_run, recover, verify
+from lathe_chatter.recording import RunWriter, read_run, recover, verify
 from lathe_chatter.recording.provenance import PUBLISHERS
 
 START = 1_700_000_000_000_000_000

@@ -20,8 +20,9 @@ from support.recorded import ARRAY, STORE, block, topic
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.cli.main import main
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.recording import RunReadError, read_run, recover, verify
+from lathe_chatter.recording import read_run, recover, verify
 
 START = 1_700_000_000_000_000_000
 Alter = Callable[[int, bytes], bytes]

@@ -15,8 +15,9 @@ from mcap.writer import Writer as McapWriter
 from support.recorded import ARRAY, BOOL, NUMBER, block, number, topic
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.recording import RunReadError, read_run, recover, verify
+from lathe_chatter.recording import read_run, recover, verify
 
 ROWS = 500
 START = 1_700_000_000_000_000_000

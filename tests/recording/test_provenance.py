@@ -6,7 +6,8 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-from lathe_chatter.recording import RunReadError, RunWriter, read_run
+from lathe_chatter.errors import RunReadError
+from lathe_chatter.recording import RunWriter, read_run
 from lathe_chatter.recording.provenance import CHECK, checked, sealed
 
 NAME = 'lathe_chatter/parameters/lathe'

@@ -7,9 +7,9 @@ import pytest
 from support.recorded import ARRAY, NUMBER, block, number, topic
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.recording import RunWriter, read_run
-from lathe_chatter.recording.run import RunReadError
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 

@@ -23,9 +23,9 @@ from support.recorded import (
     values_by_rosbags,
 )
 
+from lathe_chatter.errors import DiskFullError, RunExistsError
 from lathe_chatter.recording import RunWriter, Topic, read_run, verify
 from lathe_chatter.recording.mcap_chunk import Compression
-from lathe_chatter.recording.writer import DiskFullError, RunExistsError
 
 START = 1_700_000_000_000_000_000
 

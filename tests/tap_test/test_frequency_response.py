@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from support.tap_tests import tap_test
 
-from lathe_chatter.tap_test import (
-    FrequencyResponse,
-    FrequencyResponseError,
-    read_frequency_responses,
-)
+from lathe_chatter.errors import FrequencyResponseError
+from lathe_chatter.tap_test import FrequencyResponse, read_frequency_responses
 
 
 def write_csv(path: Path, head: str, *columns: np.ndarray, separator: str = ',') -> Path:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from support.tap_tests import THREE_MODES, tap_test
 
-from lathe_chatter.tap_test import ModalFitError, fit_modes
+from lathe_chatter.errors import ModalFitError
+from lathe_chatter.tap_test import fit_modes
 
 pytest.importorskip('sdypy.EMA', reason='the extra `identify` is not installed')
 
