@@ -10,14 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.cli.common_options import add_json
-from lathe_chatter.cli.console import Screen, writing
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.cli.common_options import add_force, add_json
+from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.model import Machine, Mode
 from lathe_chatter.model.cut import BearingContact
 from lathe_chatter.model.machine import Structure
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
 from lathe_chatter.model.uncertainty import Uncertainty
+from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.tap_test import ModalFit, fit_modes, read_frequency_responses
 
 NAME = 'identify'
@@ -48,13 +48,18 @@ def configure(parser: ArgumentParser) -> None:
         help='number of modes (default: found)',
     )  # fmt: skip
     parser.add_argument(
-        '--from', dest='low', type=float, default=0.0, metavar='HZ', help='lowest frequency used'
+        '--from',
+        dest='low',
+        type=float,
+        default=0.0,
+        metavar='HZ',
+        help='lowest frequency used, Hz',
     )
     parser.add_argument(
         '--to', dest='high', type=float, default=math.inf, metavar='HZ',
-        help='highest frequency used',
+        help='highest frequency used, Hz',
     )  # fmt: skip
-    parser.add_argument('--force', action='store_true', help='write over what is there')
+    add_force(parser)
     add_json(parser)
 
 
@@ -77,8 +82,7 @@ def run(options: Namespace) -> int:
     screen = Screen(json=options.json)
     output: Path = options.output
     picture = output.with_suffix('.png')
-    if output.exists() and not options.force:
-        raise ParameterError('--output', str(output), '', 'a new file, or with --force any')
+    keep_existing(output, *files_of_picture(picture), force=options.force)
     base = _base(options.machine)
     fits: dict[str, ModalFit] = {}
     with screen.working('Fitting the modes ...'):

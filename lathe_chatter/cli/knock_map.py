@@ -130,9 +130,9 @@ def _show(knocks: KnockMap, screen: Screen) -> None:
     limits = list(knocks.limits.items())
     counts = {margin: sum(limit.margin is margin for _, limit in limits) for margin in Margin}
     screen.say(
-        f'{len(limits)} cuts: {counts[Margin.UNSTABLE]} chatter unknocked, '
+        f'Of {len(limits)} cuts {counts[Margin.UNSTABLE]} chatter unknocked, '
         f'{counts[Margin.FINITE]} can be knocked into lasting chatter, '
-        f'{counts[Margin.NONE_FOUND]} survived every knock tried.'
+        f'{counts[Margin.NONE_FOUND]} survive every knock that was tried.'
     )
     finite = [(point, limit) for point, limit in limits if limit.margin is Margin.FINITE]
     if finite:

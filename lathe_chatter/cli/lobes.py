@@ -252,6 +252,9 @@ def _show(config: LatheConfig, limits: SafeLimit, screen: Screen) -> None:
     names.append(('safe', limits.depth_of_cut))
     for name, values in names:
         lowest, low, high = lowest_limit(limits.spindle_speed_rpm, values)
+        if math.isinf(lowest):
+            screen.say(f'no limit, {name}, at any of these speeds')
+            continue
         where = f'at {low:.0f} rev/min'
         if high > low:
             where = f'in every lobe from {low:.0f} to {high:.0f} rev/min'

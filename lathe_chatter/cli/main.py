@@ -47,11 +47,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     for each in heard:
         signal.signal(each, end)
-    from lathe_chatter.cli.verbs import parser
+    from lathe_chatter.cli.verbs import BEGINNING, parser
 
     options, unknown = parser().parse_known_args(arguments)
     if unknown:  # argparse itself would show how to give a verb, not its options
         options.usage_of.unknown(unknown)
+    if options.verb is None:
+        sys.stdout.write(BEGINNING)
+        return 0
     for each in heard:
         signal.signal(each, interrupt)
     try:

@@ -61,9 +61,11 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
     ]
     screen.table(titles, rows)
     screen.say(
-        'Pairs: chatter frequency / Hz and growth rate / (1/s), as the monitor measured them and '
-        'as the rightmost characteristic root has them, of the machine open and on its bearing.'
+        'Pairs: frequency / Hz and growth rate / (1/s) of the chatter as the monitor measured '
+        'them, and of the rightmost characteristic root, of the machine open and on its bearing.'
     )
+    if not any(series.size for series in history.estimates.values()):
+        screen.say('No figure of a monitor is in the record.')
     for sentence in (*_gap_sentences(history), *history.remarks):
         screen.say(sentence)
     excerpts = excerpts_of(history)

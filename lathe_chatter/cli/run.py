@@ -64,7 +64,7 @@ def run(options: Namespace) -> int:
     history = read_history(output)
     screen.json(show_run(history, screen))
     if interrupted:
-        screen.say('Interrupted: the run above is complete up to that moment.')
+        screen.say('Interrupted: the run above is recorded up to that moment.')
         return INTERRUPTED
     said = {
         FLAGGED: any(flag.chatter for flag in history.flags),

@@ -57,6 +57,20 @@ VERBS: tuple[Verb, ...] = (
 )
 
 
+BEGINNING = """\
+A virtual lathe with bearing clearance. To begin with:
+
+  lathe-chatter run
+      the main job: cuts in real time, watches for chatter and records (needs ROS 2)
+  lathe-chatter simulate --scenario clearance --output runs/first --report
+      the same without ROS, as fast as possible
+  lathe-chatter lobes
+      the stability chart of the machine
+
+Every verb: lathe-chatter --help. One of them: lathe-chatter VERB --help.
+"""
+
+
 class Parser(ArgumentParser):
     """A parser whose complaint is one line, and one that says where the options are told."""
 
@@ -79,7 +93,8 @@ def parser() -> Parser:
         description='A virtual lathe with bearing clearance: run it, record it, look into it.',
     )
     result.add_argument('--version', action='version', version=f'lathe-chatter {__version__}')
-    verbs = result.add_subparsers(dest='verb', metavar='VERB', required=True)
+    result.set_defaults(usage_of=result)
+    verbs = result.add_subparsers(dest='verb', metavar='VERB')
     for verb in VERBS:
         entry = verbs.add_parser(
             verb.NAME,

@@ -58,7 +58,7 @@ class ScenarioPlayer:
         self.said.append(word)
         self._said_at = time
         if not up:
-            return 'flag cleared: the cut is stable'
+            return 'flag cleared'
         figures = [f'{frequency:.1f} Hz'] if math.isfinite(frequency) else []
         figures += [f'growth {growth_rate:+.1f} 1/s'] if math.isfinite(growth_rate) else []
         return f'chatter flagged{": " if figures else ""}{", ".join(figures)}'

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from lathe_chatter.cli.main import main
-from lathe_chatter.cli.verbs import VERBS, Verb, parser
+from lathe_chatter.cli.verbs import VERBS, Parser, Verb, parser
 
 
 @pytest.mark.parametrize('verb', VERBS, ids=lambda verb: str(verb.NAME))
@@ -56,6 +57,7 @@ def test_a_mistake_is_one_sentence_and_exit_2(
             ['lobes', '--depth-limits', '1'],
             'lathe-chatter lobes: unrecognized arguments: --depth-limits 1, perhaps --depth-limit',
         ),
+        (['--versions'], 'lathe-chatter: unrecognized arguments: --versions, perhaps --version'),
         (['lobes', '--from'], 'lathe-chatter lobes: argument --from: expected one argument'),
         (['simulate'], 'lathe-chatter simulate: the following arguments are required: --output'),
     ],
@@ -66,7 +68,48 @@ def test_a_wrong_command_line_is_a_line_and_where_to_look(
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     assert ended.value.code == 2
-    assert capsys.readouterr().err == f'{said}\nSee lathe-chatter {arguments[0]} --help.\n'
+    program = said.partition(':')[0]
+    assert capsys.readouterr().err == f'{said}\nSee {program} --help.\n'
+
+
+def test_alone_it_says_how_to_begin_with_calls_that_are_valid(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main([]) == 0
+    calls = [line.split()[1:] for line in capsys.readouterr().out.split('\n') if '  lathe' in line]
+    assert len(calls) == 3
+    for words in calls:
+        assert parser().parse_args(words).verb == words[0]
+
+
+UNITS = r'(\bs\b|\bm\b|rev/min|N s\b|Hz|\bkg\b|rad/s|N/m|\bN\b)'
+NUMBERS = (
+    r'(ratio|relative|over the largest|of each call|number|part |fraction|whether|seed|times)'
+)
+
+
+@pytest.mark.parametrize('verb', VERBS, ids=lambda verb: str(verb.NAME))
+def test_every_number_that_a_verb_takes_has_its_unit_in_the_help(verb: Verb) -> None:
+    entry = Parser()
+    verb.configure(entry)
+    numbers = [a for a in entry._actions if a.type is float or a.metavar in {'X', 'A:B:N', 'T:J'}]
+    for action in numbers:
+        told = action.help or ''
+        assert re.search(UNITS, told) or re.search(NUMBERS, told), (action.dest, told)
+
+
+@pytest.mark.parametrize('verb', VERBS, ids=lambda verb: str(verb.NAME))
+def test_help_fits_a_narrow_terminal_without_colour(
+    verb: Verb, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('COLUMNS', '40')
+    monkeypatch.setenv('NO_COLOR', '1')
+    with pytest.raises(SystemExit):
+        main([verb.NAME, '--help'])
+    told = capsys.readouterr().out
+    assert '\x1b' not in told
+    long = [line for line in told.split('\n') if len(line) > 40 and ' ' in line.strip()]
+    assert not [line for line in long if not line.lstrip().startswith(('-', '['))]
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='a path is bytes on Linux')

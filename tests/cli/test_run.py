@@ -167,7 +167,8 @@ def test_an_interrupted_run_is_complete_up_to_then(
                 process.send_signal(number)
                 told = True
         assert process.wait(60) == 128 + number, ''.join(seen)
-    assert 'complete up to that moment' in ''.join(seen)
+    assert 'recorded up to that moment' in ''.join(seen)
+    assert main(['verify', str(output)]) == 0
     assert (output / 'metadata.yaml').is_file()
 
 

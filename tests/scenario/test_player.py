@@ -42,7 +42,7 @@ def test_a_step_waits_for_the_flag_and_for_a_speed() -> None:
     assert step is not None
     assert step.changes == {'spindle_speed_rpm': 3500.0}
     assert player.due(1.7, 3500.0) is None
-    assert flag(player, 2.0, up=False) == 'flag cleared: the cut is stable'
+    assert flag(player, 2.0, up=False) == 'flag cleared'
     assert player.due(2.0, math.nan) == AGAIN
     assert player.said == [FLAGGED, CLEARED]
 
