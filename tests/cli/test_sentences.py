@@ -59,7 +59,10 @@ SENTENCES: dict[str, tuple[str, ...]] = {
     r'\d+ samples in .*\.csv': ('export', 'export gap'),
     r'note   .*(missing|gap)': ('export gap',),
     # charts
-    r'lowest limit, open: 0\.59\d\d mm at \d+ rev/min': ('lobes', 'lobes without bearing'),
+    r'lowest limit, open: 0\.59\d\d mm (at|in every lobe from) ': (
+        'lobes',
+        'lobes without bearing',
+    ),
     r'lowest limit, on its bearing: ': ('lobes',),
     r'lowest limit, safe: ': ('lobes', 'lobes without bearing'),
     r'no limit, open, at any of these speeds': ('lobes without force',),
