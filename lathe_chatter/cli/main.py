@@ -45,19 +45,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         """End at once while libraries are imported: nothing has begun."""
         os._exit(128 + number)
 
-    for each in heard:
-        signal.signal(each, end)
-    from lathe_chatter.cli.verbs import BEGINNING, parser
-
-    options, unknown = parser().parse_known_args(arguments)
-    if unknown:  # argparse itself would show how to give a verb, not its options
-        options.usage_of.unknown(unknown)
-    if options.verb is None:
-        sys.stdout.write(BEGINNING)
-        return 0
-    for each in heard:
-        signal.signal(each, interrupt)
     try:
+        for each in heard:
+            signal.signal(each, end)
+        from lathe_chatter.cli.verbs import BEGINNING, parser
+
+        options, unknown = parser().parse_known_args(arguments)
+        if unknown:  # argparse itself would show how to give a verb, not its options
+            options.usage_of.unknown(unknown)
+        if options.verb is None:
+            sys.stdout.write(BEGINNING)
+            return 0
+        for each in heard:
+            signal.signal(each, interrupt)
         code = _carried_out(options)
     except KeyboardInterrupt:
         code = INTERRUPTED
