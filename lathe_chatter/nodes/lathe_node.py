@@ -53,7 +53,7 @@ class LatheNode(ParameterNode):
 
     It is woken at the rate of the ticks; how many ticks it then makes follows from the clock:
     none while paused, one as a rule, several after a delay or at a real-time factor above 1.
-    Under `use_sim_time` that clock is /clock, and all of its time is cut.
+    Under `use_sim_time` that clock is /clock, and its time is cut but for jumps.
 
     Topics, services and parameters are those of the README. A parameter set takes effect
     between two samples, all of an atomic set at the same one.
