@@ -24,10 +24,20 @@ from scenarios import MACHINE
 from simulator import RATE
 
 from lathe_chatter.arrays import Array
+from lathe_chatter.plot_style import NEUTRAL, SAFE, TOOL, WORKPIECE
 from lathe_chatter.stability import rightmost_root
 
 ASKED = 2.0
 """False alarms an hour at which delays are compared."""
+_COLOURS = (WORKPIECE, TOOL, NEUTRAL, SAFE)
+_MEANING = {
+    'S0': 'hardly any noise, steps',
+    'S1': 'force noise',
+    'S2': 'sensor noise',
+    'S3': 'force noise, steps',
+}
+_FEWEST_DRAWN = 0.1
+"""False alarms an hour at which a rate of none is drawn."""
 CALIBRATION, REPORTED = 1_000_000, 0
 """Where the seeds of the two sets begin."""
 
@@ -61,9 +71,8 @@ def onsets(options: Any) -> list[str]:
             f'{noise}: {count} onsets, {rate(calm["reported"], DETECTOR, 1.0)[1]:.2f} h stable'
         ]
         pace = turns(shaken)
-        asked = ASKED
+        asked = _asked(noise)
         if stepped:
-            asked = 0.01 * 3600.0 / scenarios.STEP
             lines[-1] += f' in steps every {scenarios.STEP:g} s; asked: 1 % false alarms a step'
         pairs = [rates_of(traces.case) for traces in shaken]
         formula = np.array([limit_formula(*pair, asked / 3600.0) for pair in pairs])
@@ -132,6 +141,11 @@ def _curve(stable: Sequence[Traces], shaken: Sequence[Traces], name: str, pace: 
     return np.array(points)
 
 
+def _asked(noise: str) -> float:
+    """False alarms an hour at which the delays of the table are compared."""
+    return 0.01 * 3600.0 / scenarios.STEP if noise in {'S0', 'S3'} else ASKED
+
+
 def _plot(curves: dict[str, dict[str, Array]], file: str) -> None:
     import matplotlib as mpl
 
@@ -139,17 +153,27 @@ def _plot(curves: dict[str, dict[str, Array]], file: str) -> None:
     from matplotlib import pyplot as plt
     from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
-    figure, axes = plt.subplots(1, len(curves), figsize=(4.2 * len(curves), 3.8), squeeze=False)
+    figure, axes = plt.subplots(1, len(curves), figsize=(3.6 * len(curves), 4.0), squeeze=False)
     for axis, (noise, of_names) in zip(axes[0], curves.items(), strict=True):
-        for name, points in of_names.items():
-            kept = points[np.isfinite(points[:, 1]) & (points[:, 0] > 0.0)]
-            axis.plot(kept[:, 0], kept[:, 1], 'o-', ms=3, label=name)
-        axis.axvline(ASKED, color='0.6', lw=1)
-        axis.set(xscale='log', yscale='log', title=noise, xlabel='false alarms per hour')
+        for (name, points), colour in zip(of_names.items(), _COLOURS, strict=True):
+            kept = points[np.isfinite(points[:, 1])]
+            # On a logarithmic axis none is drawn at the left edge, as an open mark.
+            rates = np.maximum(kept[:, 0], _FEWEST_DRAWN)
+            axis.plot(rates, kept[:, 1], '-', color=colour, label=name)
+            some = kept[:, 0] > 0.0
+            axis.plot(rates[some], kept[some, 1], 'o', ms=3.5, color=colour)
+            axis.plot(rates[~some], kept[~some, 1], 'o', ms=4, mfc='white', color=colour)
+        axis.axvline(_asked(noise), color='0.6', lw=1, zorder=0)
+        axis.set(xscale='log', yscale='log', title=f'{noise}: {_MEANING[noise]}')
+        axis.set(
+            xlabel='false alarms per hour (open: none seen)', xlim=(0.8 * _FEWEST_DRAWN, None)
+        )
+        axis.title.set_fontsize(9)
         axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.yaxis.set_major_formatter(ScalarFormatter())
         axis.yaxis.set_minor_formatter(NullFormatter())
     axes[0, 0].set_ylabel('median delay, revolutions')
-    axes[0, 0].legend(frameon=False, fontsize=8)
-    figure.tight_layout()
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc='lower center', ncols=len(labels), frameon=False)
+    figure.tight_layout(rect=(0.0, 0.08, 1.0, 1.0))
     figure.savefig(file, dpi=120)

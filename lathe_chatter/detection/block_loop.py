@@ -9,7 +9,7 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.decision import judge
-from lathe_chatter.detection.detector_state import HOPS, IDLE, WINDOWS, DetectorState
+from lathe_chatter.detection.detector_state import CHATTER, HOPS, IDLE, WINDOWS, DetectorState
 from lathe_chatter.detection.filters import Kernels
 from lathe_chatter.detection.identification import (
     forget,
@@ -22,6 +22,8 @@ from lathe_chatter.detection.records import Records
 from lathe_chatter.detection.signals import Memory, follow
 
 _REFERENCE = 3
+_STANDING = 20
+"""Hops without a turn after which an alarm is over."""
 _ROOT_EVERY, _NEW_CUT = 8, 12
 """Hops from one search of the rightmost root to the next, and hops after a jump with one each."""
 _CLEAR = 0.4
@@ -122,7 +124,11 @@ def take_hops(
         state.motion[newest] = memory.resonators
         speed = (samples[hop - 1, 0] - samples[0, 0]) / (hop - 1) * settings.rate
         if settings.has_angle != 0 and speed < settings.slowest_turns:
-            now.state, now.hops_seen = IDLE, 0
+            # A spindle that stands cuts nothing; one hop of it may be a sensor that died.
+            now.calm += 1
+            if now.calm > _STANDING:
+                now.alarmed = 0
+            now.state, now.hops_seen = CHATTER if now.alarmed != 0 else IDLE, 0
             state.speeds[:] = 0.0
             state.speeds[0] = speed
             continue

@@ -14,7 +14,7 @@ from lathe_chatter.detection.detector_state import CHATTER, HOPS, UNKNOWN, WINDO
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filters import band_of, design, gain, thinning_of
 from lathe_chatter.detection.framing import Discontinuity, Framer, HopBlock, StreamFormat
-from lathe_chatter.detection.identification import FIT, NOISE_SUMS, mechanics_of
+from lathe_chatter.detection.identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
 from lathe_chatter.detection.machine_fit import MachineFit, Verdict
 from lathe_chatter.detection.records import record
 from lathe_chatter.detection.signals import HOP_SUMS, SETTINGS, new_memory
@@ -173,6 +173,7 @@ class ChatterDetector:
         )
         self._now = self._state.now[0]
         self._fit = MachineFit(machine or _PAPER)
+        self._margin = math.nan, math.nan
         self._noise, self._total = record(NOISE_SUMS), record(HOP_SUMS)
         self._start_stretch()
 
@@ -210,14 +211,26 @@ class ChatterDetector:
             )
             if now.fit_is_due:
                 now.fit_is_due = 0
-                self._fit.close_block(self._memory.fit)
+                self._fit.close_block(self._memory.fit, jumped=bool(now.holding))
                 self._weigh_machine()
+                self._margin = self._new_margin()
             if not now.alarmed:
                 self._adviser.forget()
             elif self._adviser.is_due(since := int(now.since_alarm)):
                 modelled = self._mode is Mode.FULL and bool(self._settings['believed'][0])
                 self._adviser.consider(self._identified(), since, modelled=modelled)
         self._estimate = self._new_estimate(float(hops.times[-1]))
+
+    def _new_margin(self) -> tuple[float, float]:
+        """By what fraction C w may still grow, and the standard error of that."""
+        cutting, error = self._fit.cutting()
+        now = self._now
+        if now.alarmed or now.holding or not cutting > 2.0 * error:
+            return math.nan, math.nan
+        delay = 1.0 / float(self._state.speeds[0])
+        root = complex(now.deeper_root)
+        limit = cutting_limit(self._mechanics, cutting, float(now.stiffness), delay, root)
+        return limit / cutting - 1.0, limit / cutting * error / cutting
 
     def _weigh_machine(self) -> None:
         """Believe the machine while it fits, judge without while it does not, and correct it."""
@@ -264,6 +277,7 @@ class ChatterDetector:
             60.0 * self._speed(),
             float(now.cutting),
             float(now.stiffness),
+            float(now.cutting_error),
         )
 
     def _new_estimate(self, time: float) -> Estimate:
@@ -295,6 +309,7 @@ class ChatterDetector:
             self._adviser.advice,
             self._framer.faults(),
             words,
+            *(self._margin if mode.knows_machine and not now.alarmed else (math.nan, math.nan)),
         )
 
 

@@ -28,7 +28,7 @@ _NOW = record_type(
     usual_misfit misfits_seen peak_amplitude push score rise once_per_turn spread
     synchronous_amplitude smallest_amplitude strictness amplitude
     root_cutting root_stiffness
-    growth growth_error omega cutting stiffness
+    growth growth_error omega cutting cutting_error stiffness
     """,
     """
     newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
@@ -69,7 +69,17 @@ class DetectorState(NamedTuple):
 def new_state(bins: int, **values: object) -> DetectorState:
     """Nothing known but the fields of `now` that are given."""
     return DetectorState(
-        record(_NOW, np.nan, misfits_seen=0.0, push=0.0, score=0.0, state=UNKNOWN, **values),
+        record(
+            _NOW,
+            np.nan,
+            misfits_seen=0.0,
+            margin_weight=0.0,
+            margin_cutting=0.0,
+            push=0.0,
+            score=0.0,
+            state=UNKNOWN,
+            **values,
+        ),
         np.zeros((HOPS, bins), complex),
         np.zeros((3, bins), complex),
         np.zeros((BLOCK_COUNT + LAG + 1, bins)),

@@ -44,6 +44,11 @@ class Mode(str, Enum):
         return cls.FULL if machine is not None else cls.NO_MACHINE
 
     @property
+    def knows_machine(self) -> bool:
+        """Whether a machine is believed."""
+        return self in {Mode.FULL, Mode.CORRECTED}
+
+    @property
     def sees_spindle(self) -> bool:
         """Whether the spindle speed is known."""
         return self is not Mode.NO_SPINDLE and self is not Mode.WAITING
@@ -73,6 +78,9 @@ class Estimate:
         score: Suspicion; 1 raises the alarm.
         advice: What to do about the chatter.
         machine_fit: What is heard of a machine that was told wrong; empty where it fits.
+        margin: By what fraction the depth of cut may still grow, negative beyond the limit; known
+            while there is no alarm.
+        margin_error: Its standard error.
         faults: What is wrong with sensors that should be there, each in some words.
     """
 
@@ -93,6 +101,8 @@ class Estimate:
     advice: Advice = field(default_factory=Advice)
     faults: tuple[str, ...] = ()
     machine_fit: str = ''
+    margin: float = math.nan
+    margin_error: float = math.nan
 
     @property
     def doubling_time(self) -> float:

@@ -41,8 +41,6 @@ def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
     sensors without a mean, or there is none: then nothing is cut where nothing but the sensors'
     noise is heard, or C w is surely next to nothing.
     """
-    if known.cutting > _CUTS * known.cutting_error:
-        return True
     mean = squares = 0.0
     for back in range(_PUSHED):
         place = products[(now.newest - back) % HOPS].tool_mean
@@ -55,7 +53,7 @@ def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
         return True
     if now.push > 0.0:
         return bool(abs(mean) + error > _NO_PUSH * now.push)
-    if settings.has_machine == 0:
+    if settings.has_machine == 0 or known.cutting > _CUTS * known.cutting_error:
         return True
     heard = known.clearness > _HEARD
     most = known.cutting + _SURE * known.cutting_error
@@ -108,5 +106,5 @@ def write_figures(
     now.growth, now.growth_error = known.growth, known.growth_error
     now.omega = known.angular_frequency
     if model:
-        now.cutting = known.cutting
+        now.cutting, now.cutting_error = known.cutting, known.cutting_error
         now.stiffness = known.stiffness

@@ -38,6 +38,8 @@ NOISE_SUMS = record_type('force force_chip chip pull_workpiece workpiece')
 """What the noise of the sensors adds to the sums of one output."""
 
 _MOST_SEEDS = 32
+_DOUBLINGS, _HALVINGS = 6, 10
+"""Of C w, to find where it becomes unstable."""
 _STEP_LIMIT = 60.0
 """Largest Newton step, 1/s: no leap into another lobe."""
 _LIKELY = 2.0
@@ -136,6 +138,29 @@ def rightmost_in_band(
         if s.real > best.real or (best.real != best.real and s.real == s.real):
             best = s
     return best if best.real == best.real else guess
+
+
+@compiled()
+def cutting_limit(
+    mechanics_: Records, cutting: float, stiffness: float, delay: float, guess: complex
+) -> float:
+    """The C w at which a cut like this one becomes unstable, N/m; nan where none is found."""
+    mechanics = mechanics_[0]
+    stiffness = min(max(stiffness, mechanics.softest), mechanics.stiffest)
+    low, high = 0.0, cutting
+    for _ in range(_DOUBLINGS):
+        if rightmost_in_band(mechanics, high, stiffness, delay, guess).real > 0.0:
+            break
+        low, high = high, 2.0 * high
+    if low >= 2.0 ** (_DOUBLINGS - 1) * cutting:
+        return np.nan
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if rightmost_in_band(mechanics, middle, stiffness, delay, guess).real > 0.0:
+            high = middle
+        else:
+            low = middle
+    return low
 
 
 @compiled(inner=True)

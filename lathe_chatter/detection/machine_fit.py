@@ -130,12 +130,14 @@ def add_output(
 
 
 class _Block(NamedTuple):
-    """What a block says: weight and weighted right side for (c - c_told, k - k_told), and J."""
+    """What a block says: weight and side for (c - c_told, k - k_told), J, and C w, N/m."""
 
     weight: Array
     side: Array
     misfit: float
     freedom: float
+    cutting: float
+    cutting_error: float
 
 
 class MachineFit:
@@ -154,6 +156,7 @@ class MachineFit:
         """Nothing known."""
         self._tool = machine.tool
         self._blocks: deque[_Block] = deque(maxlen=_BLOCKS)
+        self._same_cut = 0
         self.verdict = Verdict.UNKNOWN
         self.frequency = self.error = math.nan
 
@@ -163,11 +166,23 @@ class MachineFit:
         full = len(self._blocks) == _BLOCKS
         return full and self.error < _CORRECTABLE * self.frequency
 
-    def close_block(self, sums: FitSums) -> None:
-        """Take a block in, if it is long enough, and judge."""
+    def cutting(self) -> tuple[float, float]:
+        """C w in the blocks of the present cut and its standard error, N/m; nan if unknown."""
+        blocks = [*self._blocks][-self._same_cut :] if self._same_cut else []
+        if not blocks or any(block.misfit > _MOST_J * block.freedom for block in blocks):
+            return math.nan, math.nan
+        weights = np.array([1.0 / block.cutting_error**2 for block in blocks])
+        mean = weights @ [block.cutting for block in blocks] / weights.sum()
+        return float(mean), 1.0 / math.sqrt(weights.sum())
+
+    def close_block(self, sums: FitSums, *, jumped: bool) -> None:
+        """Take a block in, if it is long enough, and judge; after a jump there is another cut."""
         if sums.counts[0] >= _FEWEST_OUTPUTS and (block := _solved(sums)) is not None:
             self._blocks.append(block)
+            self._same_cut += 1
             self._judge()
+        if jumped:
+            self._same_cut = 0
         clear_sums(sums)
 
     def _judge(self) -> None:
@@ -226,4 +241,6 @@ def _solved(sums: FitSums) -> _Block | None:
     reduced = inner[:2, :2] - np.outer(inner[:2, 2], inner[2, :2]) / inner[2, 2]
     rest = side[:2] - inner[:2, 2] * side[2] / inner[2, 2]
     freedom = 2.0 * INSTRUMENTS - 3.0
-    return _Block(reduced / variance, rest / variance, misfit, freedom)
+    spread = np.linalg.inv(inner / np.outer(units, units))[2, 2] / units[2] ** 2
+    error = _INFLATION * math.sqrt(max(variance * spread, 0.0))
+    return _Block(reduced / variance, rest / variance, misfit, freedom, float(slopes[2]), error)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import numpy as np
 
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import limits_of
-from lathe_chatter.stability import recommend_speeds, rightmost_root
+from lathe_chatter.stability import recommend_speeds, rightmost_root, rightmost_roots
 
 _CANDIDATES = 8
 _DAMPED = 0.01
@@ -20,6 +22,14 @@ _SHARE = 0.98
 _MOST = 3
 _SAME = 0.02
 """Part by which speeds may differ that come from one cut, identified twice."""
+_RULE_HOLDS = 0.3
+"""Part of the speeds by the rule of thumb that are stable; benchmarks/detection prints it."""
+_SOME_DEPTH = 1e-3
+"""m, where C is not known."""
+_AROUND, _TRIED = 0.15, 61
+"""Part of a speed by which others around it are tried, and how many are."""
+_WIDE, _AS_GOOD = 0.04, 0.8
+"""Width that an ordinary spindle can keep to; part of the damping that the middle must have."""
 _RULE_LEAST, _RULE_MOST = 1, 3
 """Waves a turn that the rule of thumb tries: of more, fewer than half were stable."""
 
@@ -41,10 +51,14 @@ class AdvisedSpeed:
     Attributes:
         spindle_speed_rpm: rev/min.
         growth_rate: Predicted, the greater one of open and seated, 1/s; nan for a rule of thumb.
+        width: Of the stable speeds around it, as a part of it; nan for a rule of thumb.
+        probability: That it is stable, as the rule of thumb has shown; nan for a prediction.
     """
 
     spindle_speed_rpm: float
     growth_rate: float = math.nan
+    width: float = math.nan
+    probability: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -83,7 +97,13 @@ class Advice:
             best = self.speeds[0]
             expected = ''
             if math.isfinite(best.growth_rate):
-                expected = f' (growth rate {best.growth_rate:.1f} 1/s)'
+                expected = f' (growth rate {best.growth_rate:.1f} 1/s'
+                if math.isfinite(best.width):
+                    expected += f', stable within +-{50.0 * best.width:.1f} %'
+                expected += ')'
+            if math.isfinite(best.probability):
+                chance = f'stable in {10.0 * best.probability:.0f} of 10 cases'
+                expected = f' (a rule of thumb without a machine, {chance})'
             return f'try {best.spindle_speed_rpm:.0f} rev/min{expected}'
         if not math.isfinite(self.depth_factor):
             return ''
@@ -95,13 +115,14 @@ class Advice:
         )
 
 
-def advise(
+def advise(  # noqa: PLR0913 -- what is known of a cut
     machine: Machine,
     cutting_stiffness: float,
     speed_range: tuple[float, float],
     current_rpm: float,
     *,
     seated: bool | None = None,
+    cutting_error: float = 0.0,
 ) -> Advice:
     """Speeds at which the cut is well damped whether or not the bearing carries.
 
@@ -116,12 +137,16 @@ def advise(
         current_rpm: The speed now, rev/min.
         seated: Whether the bearing carries throughout, or not at all; None where it does now
             and then, or nobody knows.
+        cutting_error: Standard error of C w, N/m.
     """
-    if not (cutting_stiffness > 0.0 and machine.cutting_coefficient > 0.0):
+    if not cutting_stiffness > 0.0:
         return Advice()
-    depth = cutting_stiffness / machine.cutting_coefficient
-    if depth > limits_of(Cut, 'depth_of_cut').high:
-        return Advice()  # C, or what was identified, is not to be believed
+    coefficient = machine.cutting_coefficient
+    if not cutting_stiffness < coefficient * limits_of(Cut, 'depth_of_cut').high:
+        # No such depth: C was told wrong, or not at all, and is not needed for a speed.
+        coefficient = cutting_stiffness / _SOME_DEPTH
+        machine = replace(machine, cutting_coefficient=coefficient)
+    depth = cutting_stiffness / coefficient
     low, high = speed_range
     near = max(low, current_rpm / _NEAR), min(high, current_rpm * _NEAR)
     both = (False, True)
@@ -139,11 +164,47 @@ def advise(
         found.sort(key=lambda entry: -entry[0])
         damped = [entry for entry in found if entry[0] > _DAMPED]
         if damped:
-            first = min(damped, key=lambda e: abs(math.log(e[1].spindle_speed_rpm / current_rpm)))
+            damped.sort(key=lambda e: abs(math.log(e[1].spindle_speed_rpm / current_rpm)))
+            first = damped[0]
             found.remove(first)
             found.insert(0, first)
-        return Advice(tuple(speed for _, speed in found[:_MOST]), 1.0, current_rpm)
-    return _less_depth(machine, depth, speed_range, both if seated is None else (seated,))
+        speeds = [speed for _, speed in found[:_MOST]]
+        near_ones = [speed for _, speed in damped[:_MOST]] or speeds[:1]
+        centred = [_centred(machine, depth, s, speed_range, contacts) for s in near_ones]
+        wide = [speed for speed in centred if speed.width >= _WIDE]
+        speeds[0] = wide[0] if wide else max(centred, key=lambda speed: speed.width)
+        return Advice(tuple(speeds), 1.0, current_rpm)
+    contacts = both if seated is None else (seated,)
+    return _less_depth(machine, depth, speed_range, contacts, cutting_error / cutting_stiffness)
+
+
+def _centred(
+    machine: Machine,
+    depth: float,
+    speed: AdvisedSpeed,
+    speed_range: tuple[float, float],
+    contacts: tuple[bool, ...],
+) -> AdvisedSpeed:
+    """The middle of the stable speeds around a stable one, and how wide they are."""
+    rpm = speed.spindle_speed_rpm
+    speeds = rpm * np.linspace(1.0 - _AROUND, 1.0 + _AROUND, _TRIED)
+    growths = [
+        rightmost_roots(machine, speeds, depth, seated=contact).real for contact in contacts
+    ]
+    stable = np.max(growths, axis=0) < 0.0
+    stable &= (speeds >= speed_range[0]) & (speeds <= speed_range[1])
+    low = high = _TRIED // 2
+    while low > 0 and stable[low - 1]:
+        low -= 1
+    while high < _TRIED - 1 and stable[high + 1]:
+        high += 1
+    middle = float(0.5 * (speeds[low] + speeds[high]))
+    width = float(speeds[high] - speeds[low]) / middle
+    roots = [rightmost_root(machine, middle, depth, seated=contact) for contact in contacts]
+    growth = max(root.real for root in roots)
+    if not growth < speed.growth_rate * _AS_GOOD:  # an edge of another lobe, or hardly damped
+        return replace(speed, width=width)
+    return AdvisedSpeed(middle, growth, width)
 
 
 def _stable_in(
@@ -175,7 +236,11 @@ def _stable_in(
 
 
 def _less_depth(
-    machine: Machine, depth: float, speed_range: tuple[float, float], contacts: tuple[bool, ...]
+    machine: Machine,
+    depth: float,
+    speed_range: tuple[float, float],
+    contacts: tuple[bool, ...],
+    error: float,
 ) -> Advice:
     """The deepest cut that some speed keeps stable, in every contact."""
     shallower, rpm = depth, math.nan
@@ -189,7 +254,8 @@ def _less_depth(
             count=1,
         )
         shallower, rpm = advice.stable_depth, advice.stable_speed_rpm
-    return Advice((), _SHARE * shallower / depth, rpm)
+    share = _SHARE / (1.0 + 2.0 * min(error, 1.0))
+    return Advice((), share * shallower / depth, rpm)
 
 
 def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
@@ -203,7 +269,8 @@ def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
         return Advice()
     fewest = max(_RULE_LEAST, math.ceil(60.0 * frequency / speed_range[1]))
     speeds = [60.0 * frequency / waves for waves in range(fewest, fewest + _RULE_MOST)]
-    return Advice(tuple(AdvisedSpeed(speed) for speed in speeds if speed >= speed_range[0]))
+    inside = [speed for speed in speeds if speed >= speed_range[0]]
+    return Advice(tuple(AdvisedSpeed(speed, probability=_RULE_HOLDS) for speed in inside))
 
 
 class Identified(NamedTuple):
@@ -216,6 +283,7 @@ class Identified(NamedTuple):
         spindle_speed_rpm: rev/min.
         cutting_stiffness: C w, N/m; nan without a model.
         workpiece_stiffness: N/m; nan without a model.
+        cutting_error: Standard error of C w, N/m.
     """
 
     growth_rate: float
@@ -224,6 +292,7 @@ class Identified(NamedTuple):
     spindle_speed_rpm: float
     cutting_stiffness: float
     workpiece_stiffness: float
+    cutting_error: float = 0.0
 
 
 class SpeedAdviser:
@@ -284,6 +353,7 @@ class SpeedAdviser:
             self._speed_range,
             known.spindle_speed_rpm,
             seated=_seated(self.machine, known.workpiece_stiffness),
+            cutting_error=known.cutting_error,
         )
 
 

@@ -48,7 +48,7 @@ _SERVE_PERIOD = 40_000_000
 """ns from one look for requests to the next: a look costs more than the samples of a rest."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
-_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
+_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
 _UNKNOWN = 'unknown'

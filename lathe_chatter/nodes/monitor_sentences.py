@@ -108,6 +108,7 @@ def details(estimate: Estimate) -> dict[str, object]:
     """What explains the figures, for the diagnostics."""
     numbers = {
         'standard error of the growth rate, 1/s': estimate.growth_rate_error,
+        'standard error of the margin': estimate.margin_error,
         'doubling time, s': estimate.doubling_time,
         'waves per revolution': estimate.waves_per_revolution,
         'C w, N/m': estimate.cutting_stiffness,

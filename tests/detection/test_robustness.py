@@ -6,6 +6,7 @@ Whether a cut is stable is told by its rightmost characteristic root.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ import pytest
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
-from lathe_chatter.detection.speed_advice import Advice
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
@@ -335,10 +335,95 @@ def test_who_joins_a_cut_that_has_settled_hears_no_chatter_in_its_roundings(begi
     assert estimate.state == 'stable'
 
 
-def test_with_a_cutting_coefficient_that_cannot_be_there_is_an_alarm_and_no_advice() -> None:
-    machine = Machine(cutting_coefficient=1e4)  # a depth of 0.35 m would follow
-    detector = ChatterDetector(machine)
+def test_a_cutting_coefficient_that_cannot_be_there_costs_no_advice() -> None:
+    """A depth of 0.35 m would follow: only C w is needed for a speed, and that is heard."""
+    detector = ChatterDetector(Machine(cutting_coefficient=1e4))
     samples = VirtualLathe(cut=Cut(depth_of_cut=0.001, bearing_contact='none')).advance(20_000)
     estimate = detector.update(samples, SAMPLE_COLUMNS)
     assert estimate.chatter
-    assert estimate.advice == Advice()
+    speed = estimate.recommended_speed_rpm
+    assert rightmost_root(Machine(), speed, 0.001, seated=False).real < 0.0
+
+
+@pytest.mark.parametrize('part', [0.5, 0.8])
+def test_the_margin_is_that_of_the_critical_depth(part: float) -> None:
+    lathe = VirtualLathe(cut=_cut(part * _limit()))
+    seen = _watch(ChatterDetector(), _seconds(lathe, 12.0))
+    assert seen[-1].margin == pytest.approx(1.0 / part - 1.0, abs=4.0 * seen[-1].margin_error)
+    assert seen[-1].margin_error < 0.3 / part
+
+
+_HZ = 2.0 * np.pi
+
+
+def _told(factor: float) -> Machine:
+    tool = replace(Machine().tool, natural_frequency=factor * Machine().tool.natural_frequency)
+    return replace(Machine(), tool=tool)
+
+
+@pytest.mark.parametrize('factor', [0.9, 0.95, 1.05, 1.1])
+def test_a_machine_told_wrong_is_noticed_and_corrected(factor: float) -> None:
+    detector = ChatterDetector(_told(factor))
+    seen = _watch(detector, _seconds(VirtualLathe(cut=_cut()), 16.0))
+    assert not _flagged(seen)
+    assert 'MISFIT' in {estimate.mode.name for estimate in seen}
+    last = seen[-1]
+    assert last.mode.name == 'CORRECTED'
+    told = factor * Machine().tool.natural_frequency / _HZ
+    assert f'told at {told:.1f} Hz' in last.machine_fit
+    taken = float(last.machine_fit.split('taken at ')[1].split(' ')[0])
+    assert taken == pytest.approx(Machine().tool.natural_frequency / _HZ, rel=0.02)
+
+
+def test_a_machine_told_right_is_believed() -> None:
+    seen = _watch(ChatterDetector(), _seconds(VirtualLathe(cut=_cut()), 16.0))
+    assert {estimate.mode.name for estimate in seen[1:]} == {'FULL'}
+
+
+_BROKEN: dict[str, Callable[[Array], object]] = {
+    'is not a number': lambda signal: signal.fill(np.nan),
+    'stands still': lambda signal: signal.fill(signal[0]),
+}
+
+
+@pytest.mark.parametrize(
+    'column', ['tool_displacement', 'workpiece_displacement', 'spindle_angle']
+)
+@pytest.mark.parametrize('fault', _BROKEN)
+def test_a_sensor_that_dies_amid_chatter_ends_no_alarm(fault: str, column: str) -> None:
+    samples = _chatter(5.0)
+    _BROKEN[fault](samples[30_000:40_000, SAMPLE_COLUMNS.index(column)])
+    detector = ChatterDetector()
+    before = _watch(detector, samples[:30_000])[-1]
+    assert before.chatter
+    amid = _watch(detector, samples[30_000:40_000])
+    after = _watch(detector, samples[40_000:])
+    assert all(estimate.chatter and estimate.state == 'chatter' for estimate in amid + after)
+    assert {e.recommended_speed_rpm for e in amid + after} == {before.recommended_speed_rpm}
+    assert amid[50].faults == (f'{column} {fault}',)
+    assert after[-1].faults == ()
+    assert after[-1].mode == before.mode
+
+
+def test_a_sensor_that_is_cut_off_is_named() -> None:
+    samples = _clipped(_chatter(5.0))
+    last = _watch(ChatterDetector(), samples)[-1]
+    assert last.chatter
+    assert f'{SAMPLE_COLUMNS[_TOOL]} is cut off at a limit of its range' in last.faults
+
+
+def test_an_alarm_ends_within_a_second_of_a_long_cut_and_the_state_is_idle() -> None:
+    cut = _cut(1.5 * _limit(), force_noise=0.0)
+    lathe, detector = VirtualLathe(cut=cut), ChatterDetector()
+    assert _watch(detector, _seconds(lathe, 12.0))[-1].chatter
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=0.0, feed_speed=0.0))
+    seen = _watch(detector, _seconds(lathe, 3.0))
+    assert not seen[100].chatter
+    assert seen[-1].state == 'idle'
+
+
+def test_a_knock_amid_chatter_ends_no_alarm() -> None:
+    lathe, detector = VirtualLathe(cut=_cut(1.5 * _limit())), ChatterDetector()
+    _watch(detector, _seconds(lathe, 3.0))
+    lathe.knock(0.02)
+    assert all(estimate.chatter for estimate in _watch(detector, _seconds(lathe, 3.0)))
