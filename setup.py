@@ -27,7 +27,7 @@ setup(
         'rich>=13',  # tables and progress bars of the command line
         'jinja2>=3.1',  # the page of the reproduction, from a template
         'pyyaml>=6.0.1',  # scenario files and metadata.yaml
-        'rosbags>=0.10',  # reads the runs of any rosbag2 writer, and knows the message types
+        'rosbags>=0.11',  # reads the runs of any rosbag2 writer, and knows the message types
         'mcap>=1.1',  # writes and reads MCAP
         'lz4>=4.0',  # the compression of the chunks of a run
         'zstandard>=0.22',  # that of runs written by others

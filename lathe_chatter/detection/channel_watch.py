@@ -64,7 +64,7 @@ def faults_of(channels: Records, time: float, names: tuple[str, ...]) -> tuple[s
     return tuple(found)
 
 
-@compiled()
+@compiled(inner=True)
 def _meets_rail(channel: Any, value: float) -> bool:
     """Whether a value that has come some times in a row is a rail met once more."""
     fast = channel.entry_step >= _RAIL_STEPS * channel.smallest_step

@@ -89,7 +89,7 @@ def clear_sums(sums: FitSums) -> None:
         array[0] = 0
 
 
-@compiled()
+@compiled(inner=True)
 def take_hop(sums: FitSums, counts: bool) -> None:
     """Take the newest hop into the block, or forget it."""
     if counts:
@@ -101,7 +101,7 @@ def take_hop(sums: FitSums, counts: bool) -> None:
     sums.square[1], sums.cross[1], sums.fitted[1] = 0.0, 0.0, 0.0
 
 
-@compiled()
+@compiled(inner=True)
 def add_output(
     sums: FitSums, force: complex, slope: complex, place: complex, workpiece: complex,
     chip: complex,
