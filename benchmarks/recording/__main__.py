@@ -1,8 +1,8 @@
 """The recording's figures on this machine, and what faults cost.
 
-    python benchmarks/recording [writing] [reading] [kills] [power] [disk] [flips] [truncation]
-                                [stalls] [--kills 50] [--cuts 10] [--flips 200] [--truncations 50]
-                                [--seconds 60]
+    python benchmarks/recording [writing] [reading] [kills] [programs] [power] [disk] [flips]
+                                [truncation] [stalls] [pace] [--kills 50] [--cuts 10]
+                                [--flips 200] [--truncations 50] [--seconds 60] [--factor 30]
 
 All parts by default, about six minutes; --flips 2000 --truncations 500 are ten more, and
 --seconds 600 has the recorder stand still 0.3 s in every
@@ -19,6 +19,8 @@ from collections.abc import Callable, Sequence
 
 from damage import flips, truncation
 from endings import disk, kills, power, record_for_ever
+from pace import pace
+from programs import programs
 from speed import read_here, reading, writing
 from stalls import stalls
 
@@ -31,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--flips', type=int, default=200, help='how many bits')
     parser.add_argument('--truncations', type=int, default=50, help='how many ends')
     parser.add_argument('--seconds', type=float, default=60.0, help='of the stalls')
+    parser.add_argument('--factor', type=float, default=30.0, help='of real time')
     parser.add_argument('--record', help=argparse.SUPPRESS)
     parser.add_argument('--read', nargs=2, help=argparse.SUPPRESS)
     parser.add_argument('parts', nargs='*', metavar='part')
@@ -45,11 +48,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         'writing': writing,
         'reading': reading,
         'kills': lambda: kills(options.kills),
+        'programs': lambda: programs(options.kills),
         'power': lambda: power(options.cuts),
         'disk': disk,
         'flips': lambda: flips(options.flips),
         'truncation': lambda: truncation(options.truncations),
         'stalls': lambda: stalls(options.seconds),
+        'pace': lambda: pace(options.factor, options.seconds / 4.0),
     }
     unknown = set(options.parts) - set(parts)
     if unknown:

@@ -96,7 +96,7 @@ def kills(count: int) -> None:
             lost.append((written - there) * TICK / 1e9)
             # Between its record of a message and its word to us it may have been killed.
             off += said - (written - there) not in (0, 1)
-        core = _by_mcap_core(place, files, expected)
+        core = by_mcap_core(place, files, expected)
     print(
         f'kills: {count - refused} of {count} files open in mcap and rosbags, {core}; lost at '
         f'most {max(lost):.3f} s (goal 0.5), {np.median(lost):.3f} s in the median; verify says '
@@ -104,7 +104,7 @@ def kills(count: int) -> None:
     )
 
 
-def _by_mcap_core(place: Path, files: list[Path], expected: list[int]) -> str:
+def by_mcap_core(place: Path, files: list[Path], expected: list[int]) -> str:
     """Whether the reader of Foxglove's viewers finds the same, by index and as a stream."""
     node, npm = shutil.which('node'), shutil.which('npm')
     if node is None or npm is None:

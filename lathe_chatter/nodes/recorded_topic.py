@@ -19,8 +19,8 @@ from lathe_chatter.recording.ros_messages import LOG_TYPE, PARAMETER_EVENT_TYPE
 from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 
-_BACKLOG = 10_000
-"""Messages that may wait here: 1 s of a lathe at 20 times real time."""
+_BACKLOG = 50_000
+"""Messages that may wait here: 3 s of a lathe at 30 times real time."""
 _STREAMS = (SAMPLES_TYPE, LOG_TYPE, PARAMETER_EVENT_TYPE)
 """Types of which the latest message alone says nothing."""
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}

@@ -40,8 +40,8 @@ from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.snapshot import SnapshotBuffer
 from lathe_chatter.samples.continuity import BlockOrder
 
-_COMMIT_PERIOD = 0.25
-"""s between two commits: what a kill can lose."""
+_COMMIT_PERIOD = 0.2
+"""s between two commits: with the time that one takes it is what a kill can lose."""
 _TAKE_PERIOD = 0.02
 """s between two times that what has arrived is taken."""
 _LOOK_PERIOD = 0.1

@@ -30,7 +30,7 @@ from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
-_COMMIT_PERIOD = 0.15
+_COMMIT_PERIOD = 0.1
 """s between two commits: with the time that one takes this is what a kill can lose."""
 _SECOND = 10**9
 

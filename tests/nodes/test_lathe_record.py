@@ -86,3 +86,16 @@ def test_the_lathe_cuts_on_where_its_record_cannot(
     )
     until = lathe.samples_taken + 100
     spin_until(lambda: lathe.samples_taken > until, 'more samples')
+
+
+def test_a_lathe_that_records_itself_slows_down_rather_than_lose(
+    start: Start, spin_until: Any, tmp_path: Path
+) -> None:
+    """As fast as it can: its samples come faster than a recorder could take them."""
+    lathe = start(LatheNode, real_time_factor=0.0, record=str(tmp_path / 'own'))
+    spin_until(lambda: lathe.samples_taken > 300_000, 'half a minute of cutting')
+    lathe.executor.remove_node(lathe)
+    lathe.destroy_node()
+    found = verify(tmp_path / 'own')
+    assert found.complete, found.findings
+    assert found.samples['/lathe/samples'].samples == lathe.samples_taken
