@@ -45,6 +45,9 @@ from lathe_chatter.recording.provenance import sealed
 
 _DATA_END_SIZE, _END_SIZE = 13, 37
 """Bytes of the record that ends the data, and of footer and magic."""
+_RECORD_HEAD = struct.Struct('<BQ')
+_PRIVATE = 0x80
+"""Opcode of records that readers of MCAP pass over."""
 _AT_ONCE = 1 << 17
 """Bytes that are written within some tens of microseconds."""
 
@@ -245,9 +248,13 @@ class CommittedFile:
         _write_at(self._descriptor, borrowed, end + len(summary))
         _write_at(self._descriptor, summary, end)
         _write_at(self._descriptor, _end_after(summary, end), end + len(summary))
-        # Who walks through the file meets the old end of the data until all else is there.
-        _write_at(self._descriptor, data[_DATA_END_SIZE:], start + _DATA_END_SIZE)
-        _write_at(self._descriptor, data[:_DATA_END_SIZE], start)
+        # Who walks through the file meets the old end of the data, and behind it a record that
+        # is nobody's business and reaches up to that summary, until all else is there.
+        begun = start + _DATA_END_SIZE + _RECORD_HEAD.size
+        head = _RECORD_HEAD.pack(_PRIVATE, end - begun)
+        _write_at(self._descriptor, head, start + _DATA_END_SIZE)
+        _write_at(self._descriptor, data[begun - start :], begun)
+        _write_at(self._descriptor, data[: begun - start], start)
         os.ftruncate(self._descriptor, end)
 
     def _restore(self) -> None:

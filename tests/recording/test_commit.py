@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.records import Footer
+from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 from support.recorded import topic
 
@@ -29,6 +31,10 @@ def counts(folder: Path) -> set[int]:
         by_mcap = sum(1 for _ in make_reader(stream).iter_messages())
     with Reader(folder) as reader:
         by_rosbags = sum(1 for _ in reader.messages())
+    # Some read it as a stream: chunks, the end of the data, a summary, and the end of the file.
+    with (folder / 'run_0.mcap').open('rb') as stream:
+        records = [*StreamReader(stream).records]
+    assert isinstance(records[-1], Footer)
     return {by_mcap, by_rosbags, len(list(read_run(folder).raw_messages()))}
 
 
@@ -73,10 +79,10 @@ def test_a_kill_within_any_call_leaves_the_commit_before_or_this_one(
                 writer.commit()
         return folder
 
-    found = [counts(leave_off(at)) for at in range(8)]
+    found = [counts(leave_off(at)) for at in range(9)]
     if written == 1.0:  # a call that is killed at its end is done
-        assert found[4] == {3, 23}
-        found[4] = {3}
+        assert found[5] == {3, 23}
+        found[5] = {3}
     # Before the end is cut off all is there, and ours finds it without an index.
-    assert found == [{3}] * 5 + [{3, 23}] + [{23}] * 2
-    assert calls == ['pwrite'] * 5 + ['ftruncate']
+    assert found == [{3}] * 6 + [{3, 23}] + [{23}] * 2
+    assert calls == ['pwrite'] * 6 + ['ftruncate']
