@@ -18,7 +18,9 @@ from runs import scratch
 from lathe_chatter.recording import read_run, verify
 from lathe_chatter.recording.unfinished_counts import taken
 
-_STARTED = 30.0
+_SAMPLES = 30
+"""Messages of one topic that no other has before the samples."""
+_STARTED = 60.0
 """s within which a program has begun to write."""
 _LATHE = 'lathe_chatter.nodes.lathe_node'
 
@@ -97,7 +99,7 @@ def _wait_for_samples(run: Path) -> float:
     """When a run has its first messages, s."""
     end = time.monotonic() + _STARTED
     while time.monotonic() < end:
-        if any(channel.messages > 1 for channel in taken(run).values()):
+        if any(channel.messages > _SAMPLES for channel in taken(run).values()):
             return time.monotonic()
         time.sleep(0.005)
     raise SystemExit(f'{run.name} did not begin.')
@@ -113,8 +115,8 @@ def _lost(run: Path, name: str, elapsed: float) -> float:
     counts = {channels.get(number): each for number, each in taken(run).items()}
     had = counts.get('/lathe/samples')
     there = [raw.log_time for raw in read_run(run).raw_messages('/lathe/samples')]
-    if had is None:
-        return 0.0
+    if had is None:  # nothing was committed since they came
+        return elapsed
     if not there:
         return elapsed
     if name == 'simulate':  # dated by simulated time, which runs evenly
