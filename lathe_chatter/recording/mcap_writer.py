@@ -243,18 +243,18 @@ class CommittedFile:
             _write_at(self._descriptor, data, start)
             return
         summary = self._tail[_DATA_END_SIZE:-_END_SIZE]
+        copy = record_bytes(DataEnd(data_section_crc=0)) + summary
+        far = end + len(copy)
         # A few bytes at the far end, which point to the old summary; then a copy of it there.
-        borrowed = _end_after(b'', start + _DATA_END_SIZE, proven=False)
-        _write_at(self._descriptor, borrowed, end + len(summary))
-        _write_at(self._descriptor, summary, end)
-        _write_at(self._descriptor, _end_after(summary, end), end + len(summary))
-        # Who walks through the file meets the old end of the data, and behind it a record that
-        # is nobody's business and reaches up to that summary, until all else is there.
-        begun = start + _DATA_END_SIZE + _RECORD_HEAD.size
-        head = _RECORD_HEAD.pack(_PRIVATE, end - begun)
-        _write_at(self._descriptor, head, start + _DATA_END_SIZE)
-        _write_at(self._descriptor, data[begun - start :], begun)
-        _write_at(self._descriptor, data[: begun - start], start)
+        _write_at(self._descriptor, _end_after(b'', start + _DATA_END_SIZE, proven=False), far)
+        _write_at(self._descriptor, copy, end)
+        _write_at(self._descriptor, _end_after(summary, end + _DATA_END_SIZE), far)
+        # Who walks through the file meets a record that is nobody's business and reaches up to
+        # that copy, until all that it covers is there.
+        head = _RECORD_HEAD.pack(_PRIVATE, end - start - _RECORD_HEAD.size)
+        _write_at(self._descriptor, head, start)
+        _write_at(self._descriptor, data[len(head) :], start + len(head))
+        _write_at(self._descriptor, data[: len(head)], start)
         os.ftruncate(self._descriptor, end)
 
     def _restore(self) -> None:
