@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 from mcap.opcode import Opcode
 
-from lathe_chatter.recording.mcap_reader import ChunkHead, Damage, Plain, scan
+from lathe_chatter.recording.mcap_reader import ChunkHead, Damage, Found, Plain
 
 _HEAD = 9
 """Bytes of a record before its content."""
@@ -42,10 +41,15 @@ class Span(NamedTuple):
         return cls(min(before.first, time), before.offset, max(before.last, time), end)
 
 
-def spans_of(path: Path, on_damage: Callable[[Damage], None]) -> Iterator[Span]:
-    """Each chunk of a file, and the messages outside of any as far as they follow each other."""
+def spans_of(records: Iterable[Found], on_damage: Callable[[Damage], None]) -> Iterator[Span]:
+    """Each chunk, and the messages outside of any as far as they follow each other.
+
+    Args:
+        records: Of a file, with chunks passed by.
+        on_damage: Called with every part that cannot be read.
+    """
     loose: Span | None = None
-    for found in scan(path, chunks=False):
+    for found in records:
         if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
             loose = Span.of(found, loose)
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import struct
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from itertools import pairwise
@@ -143,7 +144,7 @@ class RecordedFile:
         """
         loose = bytearray()
         first = 0
-        for found in scan(self.path):
+        for found in self._scan():
             if isinstance(found, Plain) and found.opcode == Opcode.MESSAGE:
                 first = first if loose else found.offset
                 loose += _record(found)
@@ -159,6 +160,30 @@ class RecordedFile:
         if loose:
             yield from self._contents_of(Chunk(first, 0, 0, bytes(loose), {}, proven=False))
         self._walked = True
+
+    def _scan(self, *, chunks: bool = True) -> Iterator[Found]:
+        """Walk the file; what the summary counts and is not met is damage like any other.
+
+        A flipped bit may make of a chunk a record of another kind, which nobody looks at.
+        """
+        met: Counter[int] = Counter()
+        damaged = False
+        for found in scan(self.path, chunks=chunks):
+            damaged = damaged or isinstance(found, Damage)
+            met[found.opcode if isinstance(found, Plain) else Opcode.CHUNK] += 1
+            yield found
+        counted = self.known.statistics
+        if counted is None or damaged:
+            return
+        for opcode, what, count in (
+            (Opcode.CHUNK, 'chunks', counted.chunk_count),
+            (Opcode.METADATA, 'notes', counted.metadata_count),
+            (Opcode.ATTACHMENT, 'attachments', counted.attachment_count),
+        ):
+            if met[opcode] < count:
+                end = self.path.stat().st_size
+                reason = f'{count - met[opcode]} of its {what} are not there'
+                yield Damage(self.path, end, end, reason)
 
     def by_time(self) -> Iterator[tuple[Contents, int]]:
         """The messages of each chunk, in the order of the earliest of each.
@@ -186,7 +211,7 @@ class RecordedFile:
     def _spans(self) -> Iterator[Span]:
         """Chunks and other messages; the index, which has a CRC, proves the times of a chunk."""
         indexed = {place.offset: (place.first, place.last) for place in self.known.chunks}
-        for span in spans_of(self.path, self.on_damage):
+        for span in spans_of(self._scan(chunks=False), self.on_damage):
             times = span.first, span.last
             if indexed.get(span.offset, times) != times:
                 reason = 'a chunk has not the times that the index has for it'
@@ -262,14 +287,15 @@ class RecordedFile:
             self._proofs.append(sound)
         return self._proofs[0]
 
-    def _require_proof(self, offset: int) -> None:
-        """Of what has no CRC of its own, that of all data speaks, if there is one."""
+    def _is_proven(self, offset: int) -> bool:
+        """Whether nothing speaks against what has no CRC of its own: that of all data may."""
         proof = self.prove()
         self.unproven = self.unproven or proof is None
         if proof is False and not self._told:
             self._told = True
             reason = 'its messages have no CRC of their own, and that of the file is another'
             self.on_damage(Damage(self.path, offset, self._data_end, reason))
+        return proof is not False
 
     def contradictions(self) -> Iterator[str]:
         """Where the summary says what is not so, as phrases."""
@@ -277,9 +303,6 @@ class RecordedFile:
         places = {place.offset for place in self.known.chunks}
         if places and places != {head.offset for head in heads}:
             yield 'its index does not lead to all of its chunks, and to nothing else'
-        statistics = self.known.statistics
-        if statistics is not None and statistics.chunk_count != len(heads):
-            yield f'its summary counts {statistics.chunk_count} chunks, and {len(heads)} are there'
 
     def notes(self) -> Iterator[Note]:
         """Every note, in order; one that is not as it was written is damage."""
@@ -303,7 +326,7 @@ class RecordedFile:
         return self._plain(Opcode.ATTACHMENT, Attachment)
 
     def _plain(self, opcode: int, kind: Any) -> Iterator[Any]:
-        for found in scan(self.path, chunks=False):
+        for found in self._scan(chunks=False):
             if isinstance(found, Damage):
                 self.on_damage(found)
             elif isinstance(found, Plain) and found.opcode == opcode:
@@ -318,8 +341,8 @@ class RecordedFile:
                     self.on_damage(Damage(self.path, *where, f'{what} {reason}'))
 
     def _contents_of(self, chunk: Chunk) -> Iterator[Contents]:
-        if not chunk.proven:
-            self._require_proof(chunk.offset)
+        if not chunk.proven and not self._is_proven(chunk.offset) and self.known.chunks:
+            return  # no message, but what damage has made of the index of a chunk
         try:
             messages = messages_of(chunk)
             for offset in messages.others:

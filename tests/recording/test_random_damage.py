@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -38,3 +40,24 @@ def test_damage_is_found_and_nothing_wrong_handed_out(
     for _ in range(count):
         where = damage(folder, tmp_path / 'run', generator)  # type: ignore[operator]
         assert [*faults(tmp_path / 'run', whole, tmp_path)] == [], f'{where}, seed {SEED}'
+
+
+def test_a_record_that_becomes_one_of_another_kind_is_missed(
+    folder: Path, whole: Held, tmp_path: Path
+) -> None:
+    """One bit makes of a chunk a channel or a private record, of an index a message."""
+    data = (folder / 'run_0.mcap').read_bytes()
+    places = {0x06: 0, 0x07: 0, 0x0C: 0}  # the first chunk, message index and note
+    place = 8
+    while place < len(data) - 8:
+        opcode, length = struct.unpack_from('<BQ', data, place)
+        places[opcode] = places.get(opcode) or place
+        place += 9 + length
+    shutil.copytree(folder, tmp_path / 'run')
+    for opcode in (0x06, 0x07, 0x0C):
+        for bit in range(8):
+            damaged = bytearray(data)
+            damaged[places[opcode]] ^= 1 << bit
+            (tmp_path / 'run' / 'run_0.mcap').write_bytes(damaged)
+            where = f'bit {bit} of opcode {opcode}'
+            assert [*faults(tmp_path / 'run', whole, tmp_path)] == [], where
