@@ -13,9 +13,9 @@ from runs import scratch
 
 sys.path.append(str(Path(__file__).parents[2] / 'tests'))
 
-from support.damage import faults, flipped, held_by, record, truncated
+from support.damage import faults, flipped, held_by, noticed, record, truncated
 
-from lathe_chatter.recording import read_run, verify
+from lathe_chatter.recording import read_run
 
 Damage = Callable[[Path, Path, np.random.Generator], str]
 
@@ -35,7 +35,7 @@ def _judge(name: str, damage: Damage, count: int) -> None:
     seed = int(np.random.default_rng().integers(2**32))
     generator = np.random.default_rng(seed)
     wrong: Counter[str] = Counter()
-    noticed, began = 0, time.perf_counter()
+    count_noticed, began = 0, time.perf_counter()
     with scratch() as place:
         record(place / 'whole')
         whole = held_by(read_run(place / 'whole'))
@@ -46,9 +46,9 @@ def _judge(name: str, damage: Damage, count: int) -> None:
             for fault in faults(copy, whole, place):
                 wrong[fault] += 1
                 print(f'{name}: {where}: {fault}')
-            noticed += not verify(copy).complete
+            count_noticed += noticed(copy)
     print(
-        f'{name}: of {count}, verify notices {noticed}; what it does not notice changes nothing '
+        f'{name}: of {count}, verify notices {count_noticed}; what it does not notice changes nothing '
         f'that is read. Wrong samples, parameters, notes or messages handed out, tracebacks: '
         f'{sum(wrong.values())} (seed {seed}, {time.perf_counter() - began:.0f} s)'
     )

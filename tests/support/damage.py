@@ -110,6 +110,14 @@ def faults(path: Path, whole: Held, place: Path) -> Iterator[str]:
         yield 'recover saves samples that never were'
 
 
+def noticed(path: Path) -> bool:
+    """Whether `verify` says that something is wrong with a run."""
+    try:
+        return not verify(path).complete
+    except LatheChatterError:
+        return True
+
+
 def _attempt(work: Callable[[], Any]) -> Any:
     """What comes of some work: None where it is refused in a sentence, a text of a traceback."""
     try:
