@@ -48,7 +48,7 @@ def _judge(name: str, damage: Damage, count: int) -> None:
                 print(f'{name}: {where}: {fault}')
             count_noticed += noticed(copy)
     print(
-        f'{name}: of {count}, verify notices {count_noticed}; what it does not notice changes nothing '
-        f'that is read. Wrong samples, parameters, notes or messages handed out, tracebacks: '
+        f'{name}: of {count}, verify notices {count_noticed}; the others change nothing that is '
+        f'read. Wrong samples, parameters, notes or messages handed out, tracebacks: '
         f'{sum(wrong.values())} (seed {seed}, {time.perf_counter() - began:.0f} s)'
     )
