@@ -27,7 +27,7 @@ BEGINNING_AGAIN = 'At 0.000000 s: the cut begins again.'
 
 _SENTENCE = re.compile(r'^At (?P<time>[0-9.e+-]+) s: (?P<changes>.+ -> .+)\.$')
 _KNOCK = re.compile(r'^At (?P<time>[0-9.e+-]+) s: knock of (?P<impulse>\S+) N s\.$')
-_CHANGE = re.compile(r'^(?P<name>\w+) (?P<old>\S+) -> (?P<new>\S+)(?: \S+)?$')
+_CHANGE = re.compile(r'^(?P<name>\w+) (?P<old>\S+) -> (?P<new>\S+)(?: \S+)*$')
 
 
 @dataclass(frozen=True)

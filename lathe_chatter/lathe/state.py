@@ -13,18 +13,17 @@ import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import ParameterError, StateError
-from lathe_chatter.lathe.integrator import propagation, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.coefficients import steps_per_sample
+from lathe_chatter.lathe.integrator import surface
+from lathe_chatter.lathe.integrator.coefficients import Constants, constants_of, steps_per_sample
+from lathe_chatter.lathe.integrator.eigenbasis import product
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
 from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity
 
 _STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)
-_FORMAT = 1
+_FORMAT = 2
 """Of a saved state; another one is refused."""
-_ROOM = 512
-"""Nodes of the surface for which there is room at first."""
 
 
 @dataclass(eq=False)
@@ -34,8 +33,9 @@ class LatheState:
     Attributes:
         setup: What it was given at the start.
         cut: The parameters of the cut in force.
-        numbers: State, spindle angle, feed and speed (layout.NUMBERS_SIZE,).
-        counts: Samples, turns and regimes (layout.COUNTS_SIZE,).
+        numbers: Spindle, surface met, and the coordinates of the 2n modes
+            (layout.NUMBERS_SIZE + 4n,).
+        counts: Samples and regimes (layout.COUNTS_SIZE,).
         nodes: The surface of the last turn (nodes, surface.NODE_SIZE).
         guard: Why the run has ended, or an empty string.
     """
@@ -57,7 +57,9 @@ class LatheState:
             setup: Machine, force law and sampling.
             cut: What is cut at the start.
             initial_state: Tool displacement and velocity, workpiece displacement and velocity
-                (4,), m and m/s; by default the paper's.
+                (4,), m and m/s; by default the paper's. A body with several modes is displaced as
+                by a force that rests on it, and has its velocity from a blow, both in the chip
+                direction.
 
         Raises:
             ParameterError: If the initial state is not four finite numbers, or the machine with
@@ -67,53 +69,65 @@ class LatheState:
         if np.shape(given) != (4,):
             raise ParameterError('initial_state', given, '', 'four numbers')
         start = np.array([_STATE.check('initial_state', value) for value in given])
-        numbers = np.zeros(layout.NUMBERS_SIZE)
-        numbers[:4] = start
+        modes = len(setup.machine.tool.modes) + len(setup.machine.workpiece.modes)
+        numbers = np.zeros(layout.NUMBERS_SIZE + 4 * modes)
         speed = cut.spindle_speed_rpm / 60.0
         numbers[layout.SPEED] = speed
-        feed = cut.feed_speed / speed if setup.tool_leaves_cut else 0.0
-        offset = start[0] - start[2]
-        nodes = surface.fresh_surface(feed, _ROOM)
-        nodes[:2, surface.HEIGHT] += offset
-        numbers[layout.MET], numbers[layout.MET_SLOPE] = offset - feed, feed
         counts = np.zeros(layout.COUNTS_SIZE, dtype=np.int64)
         counts[layout.HEAD], counts[layout.CORNER] = 1, 1
-        counts[layout.REGIME] = propagation.IN_CUT
-        state = cls(setup, cut, numbers, counts, nodes)
-        state._settle_regime()
-        counts[layout.STEPS] = state.steps_for(cut)
+        counts[layout.STEPS] = steps_per_sample(setup, cut, speed)
+        state = cls(setup, cut, numbers, counts, np.empty((0, surface.NODE_SIZE)))
+        settings = state.constants.settings
+        motion = _modal(start, state.constants)
+        counts[layout.REGIME] = layout.IN_CUT + 2 * state._touch(_bearing(state.constants, motion))
+        state._take_coordinates(motion)
+        offset = numbers[layout.RELATIVE]
+        state.nodes = surface.fresh_surface(offset, settings[layout.TURN], 2)
+        numbers[layout.HEIGHT] = offset
         return state
 
-    def steps_for(self, cut: Cut) -> int:
-        """Steps a sample for a cut that begins now.
-
-        Chosen when the cut changes and then remembered: a restored run takes the same steps.
-
-        Raises:
-            ParameterError: If the machine is too fast for the sample rate.
-        """
-        speed = max(cut.spindle_speed_rpm / 60.0, float(self.numbers[layout.SPEED]))
-        return steps_per_sample(self.setup.machine, cut, speed, self.setup.sample_rate)
+    @property
+    def constants(self) -> Constants:
+        """Of the inner loop, for this cut."""
+        return constants_of(self.setup, self.cut, int(self.counts[layout.STEPS]))
 
     def retune(self, cut: Cut) -> None:
         """Change the cut here; nothing is restarted.
 
         Raises:
-            ParameterError: If the machine with this cut is too fast for the sample rate; then
-                nothing has changed.
+            ParameterError: If the machine with this cut is too fast for the sample rate, or
+                turns too slowly for it; then nothing has changed.
         """
-        self.counts[layout.STEPS] = self.steps_for(cut)
+        steps = steps_per_sample(self.setup, cut, float(self.numbers[layout.SPEED]))
+        old, new, motion = self.constants, constants_of(self.setup, cut, steps), self._motion()
         bearing = (self.cut.bearing_contact, self.cut.bearing_clearance)
-        self.cut = cut
+        self.cut, self.counts[layout.STEPS] = cut, steps
+        counts = self.counts
         if self.setup.spindle_acceleration == 0.0:
             self.numbers[layout.SPEED] = cut.spindle_speed_rpm / 60.0
         if (cut.bearing_contact, cut.bearing_clearance) != bearing:
-            self._settle_regime()
+            touch = self._touch(float(self.numbers[layout.AT_BEARING]))
+            counts[layout.REGIME] = (counts[layout.REGIME] & layout.IN_CUT) + 2 * touch
+        self._recount(old.settings, new.settings)
+        self._take_coordinates(motion)
         self._corner(1)
 
+    def motion(self) -> tuple[float, float, float, float]:
+        """Tool displacement and velocity, workpiece displacement and velocity, m and m/s."""
+        constants, motion = self.constants, self._motion()
+        half, shapes = len(motion) // 2, constants.shapes
+        return (
+            _sum(shapes.tool * motion[:half]),
+            _sum(shapes.tool * motion[half:]),
+            _sum(shapes.workpiece * motion[:half]),
+            _sum(shapes.workpiece * motion[half:]),
+        )
+
     def knock(self, impulse: float) -> None:
-        """Let the tool's velocity jump by impulse / m_t here; `impulse` in N s."""
-        self.numbers[layout.TOOL_V] += impulse / self.setup.machine.tool.mass
+        """Let the tool's modes start as a blow of `impulse`, N s, makes them; here."""
+        motion, constants = self._motion(), self.constants
+        motion[len(motion) // 2 :] += constants.shapes.on_tool * impulse
+        self._take_coordinates(motion)
         self._corner(1)
 
     def end(self) -> None:
@@ -127,10 +141,10 @@ class LatheState:
 
     def copy(self) -> LatheState:
         """The same state with a memory of its own, no larger than it must be."""
-        nodes = self.nodes[: int(self.counts[layout.HEAD]) + 1].copy()
-        return LatheState(
-            self.setup, self.cut, self.numbers.copy(), self.counts.copy(), nodes, self.guard
-        )
+        counts, pointer = self.counts.copy(), int(self.counts[layout.POINTER])
+        nodes = self.nodes[pointer : int(counts[layout.HEAD]) + 1].copy()
+        counts[layout.POINTER], counts[layout.HEAD] = 0, len(nodes) - 1
+        return LatheState(self.setup, self.cut, self.numbers.copy(), counts, nodes, self.guard)
 
     def __eq__(self, other: object) -> bool:
         """Equal bit for bit, whatever room there is for more."""
@@ -192,14 +206,16 @@ class LatheState:
 
     def _check(self, path: str | Path) -> None:
         """Refuse arrays on which the inner loop could not work."""
+        machine = self.setup.machine
+        modes = len(machine.tool.modes) + len(machine.workpiece.modes)
         fits = (
-            self.numbers.shape == (layout.NUMBERS_SIZE,)
+            self.numbers.shape == (layout.NUMBERS_SIZE + 4 * modes,)
             and self.counts.shape == (layout.COUNTS_SIZE,)
             and self.nodes.shape == (int(self.counts[layout.HEAD]) + 1, surface.NODE_SIZE)
             and [array.dtype.str[1:] for array in (self.numbers, self.counts, self.nodes)]
             == ['f8', 'i8', 'f8']
             and 0 <= self.counts[layout.POINTER] < self.counts[layout.HEAD]
-            and 0 <= self.counts[layout.REGIME] < propagation.REGIMES
+            and 0 <= self.counts[layout.REGIME] < layout.REGIMES
             and self.counts[layout.STEPS] > 0
             and np.isfinite(self.numbers).all()
         )
@@ -208,13 +224,75 @@ class LatheState:
 
     # -- how -------------------------------------------------------------------------------
 
-    def _settle_regime(self) -> None:
-        """Decide from the displacement whether the bearing carries."""
-        contact = self.cut.bearing_contact
-        touches = self.numbers[layout.WORKPIECE_X] >= self.cut.bearing_clearance
-        self.counts[layout.REGIME] &= ~propagation.ENGAGED
-        if contact is BearingContact.SEATED or (contact is BearingContact.GAP and touches):
-            self.counts[layout.REGIME] |= propagation.ENGAGED
+    def _touch(self, displacement: float) -> int:
+        """Which side of its bearing the workpiece touches with a displacement there, m."""
+        contact, clearance = self.cut.bearing_contact, self.cut.bearing_clearance
+        if contact is BearingContact.NONE:
+            return layout.FREE
+        if contact is BearingContact.SEATED or displacement >= clearance:
+            return layout.ABOVE
+        both = contact is BearingContact.BOTH_SIDES
+        return layout.BELOW if both and displacement <= -clearance else layout.FREE
+
+    def _motion(self) -> Array:
+        """The modes over their root of mass, and their velocities per second (2n,).
+
+        Where nothing has moved since they were made, they are what was made: then changes before
+        the first step are as if the lathe had begun with them, to the last bit.
+        """
+        first = layout.NUMBERS_SIZE
+        half = (len(self.numbers) - first) // 4
+        if self.counts[layout.MADE]:
+            return self.numbers[first + 2 * half :].copy()
+        constants, regime = self.constants, int(self.counts[layout.REGIME])
+        coordinates = self.numbers[first : first + 2 * half, None]
+        moved = product(constants.bases[regime].vectors, coordinates)[:, 0]
+        result: Array = moved + constants.rests[regime]
+        result[half:] /= constants.settings[layout.STEP_LENGTH]
+        return result
+
+    def _take_coordinates(self, motion: Array) -> None:
+        """Remember a motion as coordinates of the present regime, and what it means."""
+        constants, regime = self.constants, int(self.counts[layout.REGIME])
+        half, shapes, first = len(motion) // 2, constants.shapes, layout.NUMBERS_SIZE
+        self.numbers[first + 2 * half :], self.counts[layout.MADE] = motion, 1
+        motion = motion.copy()
+        motion[half:] *= constants.settings[layout.STEP_LENGTH]
+        away = (motion - constants.rests[regime])[:, None]
+        self.numbers[first : first + 2 * half] = product(constants.bases[regime].inverse, away)[
+            :, 0
+        ]
+        for place, rate, shape in (
+            (layout.RELATIVE, layout.RELATIVE_RATE, shapes.relative),
+            (layout.AT_BEARING, layout.AT_BEARING_RATE, shapes.bearing),
+        ):
+            self.numbers[place] = product(shape[None], motion[:half, None])[0, 0]
+            self.numbers[rate] = product(shape[None], motion[half:, None])[0, 0]
+
+    def _recount(self, old: Array, new: Array) -> None:
+        """Count the spindle's angle in other steps, and the surface from another feed."""
+        numbers, counts = self.numbers, self.counts
+        feeds = np.array([s[layout.FEED] / s[layout.TURN] for s in (old, new)])
+        ratio = new[layout.TURN] / old[layout.TURN]
+        if ratio == 1.0 and feeds[0] == feeds[1]:
+            return
+        place, ahead = numbers[layout.PLACE], numbers[layout.AHEAD]
+        used = self.nodes[: int(counts[layout.HEAD]) + 1]
+        self.nodes[: len(used)] = surface.recounted(used, place, ratio, ahead, feeds)
+        met = np.zeros((1, surface.NODE_SIZE))
+        met[0, surface.PLACE] = place - old[layout.TURN]
+        met[0, surface.HEIGHT] = numbers[layout.HEIGHT]
+        met[0, surface.SLOPE_AFTER] = numbers[layout.SLOPE]
+        met[0, surface.CURVATURE_AFTER] = numbers[layout.CURVATURE]
+        met = surface.recounted(met, place, ratio, ahead, feeds)
+        numbers[layout.HEIGHT] = met[0, surface.HEIGHT]
+        numbers[layout.SLOPE] = met[0, surface.SLOPE_AFTER]
+        numbers[layout.CURVATURE] = met[0, surface.CURVATURE_AFTER]
+        turned = numbers[layout.ORIGIN_LOW] + place / old[layout.TURN]
+        total = numbers[layout.ORIGIN] + turned
+        numbers[layout.ORIGIN_LOW] = turned - (total - numbers[layout.ORIGIN])
+        numbers[layout.ORIGIN] = total
+        numbers[layout.PLACE] = numbers[layout.AHEAD] = 0.0
 
     def _corner(self, order: int) -> None:
         """Note that derivative `order` of the surface jumps here."""
@@ -233,8 +311,33 @@ def _check_format(path: str | Path, found: object) -> None:
 def _setup_from(words: dict[str, Any]) -> LatheSetup:
     """A setup from its fields as JSON has them."""
     machine = words.pop('machine')
-    tool, workpiece = Mode(**machine.pop('tool')), Mode(**machine.pop('workpiece'))
-    return LatheSetup(Machine(tool, workpiece, **machine), **words)
+    for name in ('tool', 'workpiece'):
+        body = machine[name]
+        several = 'modes' in body
+        machine[name] = [Mode(**mode) for mode in body['modes']] if several else Mode(**body)
+    return LatheSetup(Machine(**machine), **words)
+
+
+def _modal(start: Array, constants: Constants) -> Array:
+    """The modes over their root of mass, and their velocities (2n,), of a start (4,)."""
+    shapes = constants.shapes
+    motion = np.zeros((2, len(shapes.frequency)))
+    for shape, x, v in ((shapes.tool, *start[:2]), (shapes.workpiece, *start[2:])):
+        if shape.any():
+            pressed = shape / shapes.frequency**2
+            motion[0] += pressed * (x / _sum(pressed * shape))
+            motion[1] += shape * (v / _sum(shape * shape))
+    return motion.ravel()
+
+
+def _bearing(constants: Constants, motion: Array) -> float:
+    """The displacement at the bearing, m."""
+    return _sum(constants.shapes.bearing * motion[: len(motion) // 2])
+
+
+def _sum(values: Array) -> float:
+    """In order: so the bits are the same everywhere."""
+    return float(sum(values.tolist()))
 
 
 def differences(one: LatheSetup, other: LatheSetup) -> list[str]:

@@ -117,5 +117,4 @@ def sample_rate_for(cut: Cut, samples_per_turn: int) -> float:
 
 def _present(lathe: VirtualLathe) -> Array:
     """What a lathe that ends before its next sample stands still at (8,)."""
-    state = lathe.snapshot()
-    return np.array([lathe.time, lathe.spindle_angle, *state.numbers[:4], 0.0, 0.0])
+    return np.array([lathe.time, lathe.spindle_angle, *lathe.snapshot().motion(), 0.0, 0.0])

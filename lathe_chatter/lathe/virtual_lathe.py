@@ -10,16 +10,18 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError, StateError
-from lathe_chatter.lathe.integrator import propagation, stepper, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.coefficients import constants_of
+from lathe_chatter.lathe.integrator import stepper, surface
 from lathe_chatter.lathe.state import LatheState, differences
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity, count_of
-from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples import sample_columns
 
 IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
+
+_ROOM = 512
+"""Nodes of the surface for which there is room at first."""
 
 
 class EventKind(IntEnum):
@@ -41,11 +43,11 @@ class Event(NamedTuple):
 class VirtualLathe:
     """A turning process with bearing clearance, integrated sample by sample.
 
-    The machine is that of the paper's equations (8)-(9). With `tool_leaves_cut` the cutting
-    force is F = C w max(h, 0), h = feed + r - (surface left before), and where the tool is out
-    of the cut the surface of earlier revolutions stays; without it the force is the paper's
-    linear one about the mean, equation (2). Speed changes need no restart: the delay is the
-    time since the spindle was one turn back.
+    The machine is that of the paper's equations (8)-(9), of one mode a body or of several. With
+    `tool_leaves_cut` the cutting force is F = C w max(h, 0), h = feed + r - (surface left before),
+    and where the tool is out of the cut the surface of earlier revolutions stays; without it the
+    force is the paper's linear one about the mean, equation (2), and so is the chip thickness.
+    Speed changes need no restart: the delay is the time since the spindle was one turn back.
 
     Args:
         machine: Tool, workpiece, bearing and material; by default the paper's.
@@ -57,10 +59,14 @@ class VirtualLathe:
         spindle_acceleration: rev/min per s at which the speed follows a change; 0 for a step.
         seed: Of force noise and sensor noise.
         displacement_limit: The run ends when a displacement passes it, m.
+        accelerometers: Whether samples have the accelerations of both bodies too.
 
     Raises:
         ParameterError: If a value is not allowed.
     """
+
+    _event_space: Array
+    _found: list[Array]
 
     def __init__(  # noqa: PLR0913 -- what cannot change later is named here
         self,
@@ -73,6 +79,7 @@ class VirtualLathe:
         spindle_acceleration: float = 0.0,
         seed: int = 0,
         displacement_limit: float = 1.0,
+        accelerometers: bool = False,
     ) -> None:
         """See the class."""
         setup = LatheSetup(
@@ -82,17 +89,16 @@ class VirtualLathe:
             spindle_acceleration,
             seed,
             displacement_limit,
+            accelerometers,
         )
-        self._event_space: Array = np.empty((64, 3))
-        self._found: list[Array] = []
         start = Cut() if cut is None else _checked(cut)
         self._begin(LatheState.fresh(setup, start, initial_state))
 
     @classmethod
     def continued(cls, state: LatheState) -> VirtualLathe:
         """A lathe that goes on from a snapshot or a loaded state, bit for bit."""
-        lathe = cls(state.setup.machine, state.cut)
-        lathe._begin(state.copy())
+        lathe = cls.__new__(cls)
+        lathe._begin(state.copy())  # noqa: SLF001 -- its own
         return lathe
 
     # -- what it is doing ----------------------------------------------------------------
@@ -118,6 +124,11 @@ class VirtualLathe:
         return self._state.cut
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """Those of the samples: with accelerations where the setup has accelerometers."""
+        return sample_columns(accelerometers=self.setup.accelerometers)
+
+    @property
     def samples_taken(self) -> int:
         """Samples since the start."""
         return int(self._state.counts[layout.SAMPLES])
@@ -130,17 +141,21 @@ class VirtualLathe:
     @property
     def spindle_angle(self) -> float:
         """Revolutions since the start."""
-        return float(self._state.counts[layout.TURNS] + self._state.numbers[layout.ANGLE])
+        numbers = self._state.numbers
+        turn = self._state.constants.settings[layout.TURN]
+        turned = numbers[layout.ORIGIN_LOW] + numbers[layout.PLACE] * (1.0 / turn)
+        return float(numbers[layout.ORIGIN] + turned)
 
     @property
     def bearing_engaged(self) -> bool:
         """Whether the workpiece touches its bearing across the clearance."""
-        return bool(self._state.counts[layout.REGIME] & propagation.ENGAGED)
+        return bool(self._state.counts[layout.REGIME] >> 1)
 
     @property
     def tool_in_cut(self) -> bool:
-        """Whether the tool removes material."""
-        return bool(self._state.counts[layout.REGIME] & propagation.IN_CUT)
+        """Whether the tool removes material; at a depth of 0 there is none."""
+        in_cut = self._state.counts[layout.REGIME] & layout.IN_CUT
+        return bool(in_cut) and self.cut.depth_of_cut > 0.0
 
     @property
     def guard(self) -> str:
@@ -167,14 +182,14 @@ class VirtualLathe:
             samples: How many, 0 or more.
 
         Returns:
-            The samples (n, 8), columns as in `model.SAMPLE_COLUMNS`. Fewer than asked for,
+            The samples (n, 8) or (n, 10), columns as in `columns`. Fewer than asked for,
             and `guard` says why, once a displacement has passed its limit.
 
         Raises:
             ParameterError: If `samples` is negative.
         """
         count_of('samples', samples)
-        out = np.empty((0 if self.guard else samples, len(SAMPLE_COLUMNS)))
+        out = np.empty((0 if self.guard else samples, self._columns))
         self._found = []
         rows, status = 0, layout.SURFACE_FULL
         while status in {layout.SURFACE_FULL, layout.EVENTS_FULL}:
@@ -235,22 +250,26 @@ class VirtualLathe:
 
     def _begin(self, state: LatheState) -> None:
         """Take over a state."""
+        state.numbers = surface.aligned_copy(state.numbers)
+        state.nodes = surface.with_room(state.nodes, len(state.nodes) + _ROOM)
         self._state = state
+        self._event_space = np.empty((64, 3))
         self._found = []
         self._prepare()
 
     def _prepare(self) -> None:
         """Turn machine and cut into the constants of the inner loop."""
-        steps = int(self._state.counts[layout.STEPS])
-        self._constants = constants_of(self.setup, self.cut, steps)
+        modes = len(self._state.numbers) - layout.NUMBERS_SIZE >> 2
+        self._flat, self._shape = self._state.constants.flat, (0.0,) * modes
+        self._columns = len(self.columns)
+        self._room = stepper.room_for(modes)
 
     def _call(self, out: Array) -> tuple[int, int, int]:
         """Run the inner loop on `out`: samples, events, and how it ended."""
-        state, constants = self._state, self._constants
+        state = self._state
         done, found, status = stepper.advance(
-            state.numbers, state.counts, state.nodes,
-            constants.settings, constants.mechanics, constants.matrices,
-            self.setup.seed, out, self._event_space,
+            state.numbers, state.counts, state.nodes, self._flat, out, self._event_space,
+            self._room, self._shape,
         )  # fmt: skip
         return int(done), int(found), int(status)
 

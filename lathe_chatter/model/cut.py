@@ -22,6 +22,8 @@ class BearingContact(str, Enum):
     """Equation (9) as printed: the bearing engages while x_wp >= gamma."""
     SEATED = 'seated'
     """The screening function is 1 throughout: the workpiece-spindle rests on its bearing."""
+    BOTH_SIDES = 'both_sides'
+    """The bearing engages beyond the clearance on either side, |x_wp| >= gamma."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,35 @@ class Cut:
     bearing_clearance: float = quantity('bearing clearance gamma', 'm', default=5e-6, high=0.001)
     bearing_contact: BearingContact = BearingContact.GAP
     feed_speed: float = quantity('feed speed', 'm/s', default=0.0025, high=0.1)
+    feed_per_revolution: float = quantity(
+        'feed per revolution that the feed speed follows the spindle by; 0: feed_speed rules',
+        'm',
+        default=0.0,
+        high=0.01,
+    )
+    process_damping: float = quantity(
+        'C_pd of a damping force C_pd (w/V) r_dot, V the surface speed',
+        'N/m',
+        default=0.0,
+        high=1e9,
+    )
+    workpiece_diameter: float = quantity(
+        'diameter that is turned, for its surface speed', 'm', default=0.05, low=1e-4, high=10.0
+    )
+    unbalance: float = quantity(
+        'unbalance U on the workpiece: a force U Omega^2 once a turn',
+        'kg m',
+        default=0.0,
+        high=10.0,
+    )
     force_noise: float = quantity(
         'random force on the tool: its mean over T s has the variance force_noise^2/T',
+        'N/sqrt(Hz)',
+        default=0.0,
+        high=1e3,
+    )
+    cutting_force_noise: float = quantity(
+        'random part of the cutting force, on tool and workpiece, measured like force_noise',
         'N/sqrt(Hz)',
         default=0.0,
         high=1e3,
@@ -48,8 +77,14 @@ class Cut:
     sensor_noise: float = quantity(
         'noise of the measured displacements, rms per sample', 'm', default=0.0, high=1e-3
     )
+    acceleration_noise: float = quantity(
+        'noise of the measured accelerations, rms per sample', 'm/s2', default=0.0, high=1e4
+    )
     runout: float = quantity(
         'once-per-turn amplitude at the workpiece', 'm', default=0.0, high=1e-3
+    )
+    tool_runout: float = quantity(
+        "once-per-turn amplitude that the tool's sensor sees", 'm', default=0.0, high=1e-3
     )
     speed_variation_amplitude: float = quantity(
         'sinusoidal speed variation, fraction of the spindle speed', default=0.0, high=0.5
@@ -72,7 +107,7 @@ class Cut:
     @property
     def feed(self) -> float:
         """Feed per revolution at the mean speed, m."""
-        return self.feed_speed * self.delay
+        return self.feed_per_revolution or self.feed_speed * self.delay
 
     def with_changes(self, **changes: Any) -> Cut:
         """The same cut with some fields changed.
@@ -95,4 +130,5 @@ class Cut:
 
 def paper_initial_state(cut: Cut) -> Array:
     """The paper's history at t = 0: both bodies displaced by f/1000 and moving with v (4,)."""
-    return np.array([cut.feed / 1000.0, cut.feed_speed, cut.feed / 1000.0, cut.feed_speed])
+    speed = cut.feed / cut.delay if cut.feed_per_revolution else cut.feed_speed
+    return np.array([cut.feed / 1000.0, speed, cut.feed / 1000.0, speed])

@@ -24,6 +24,7 @@ class LatheSetup:
         spindle_acceleration: At which the speed follows a change, rev/min per s; 0 for a step.
         seed: Of force noise and sensor noise.
         displacement_limit: The run ends when a displacement passes it, m.
+        accelerometers: Whether the samples have the accelerations of tool and workpiece too.
 
     Raises:
         ParameterError: If a value is not allowed.
@@ -44,15 +45,18 @@ class LatheSetup:
     displacement_limit: float = quantity(
         'displacement beyond which a run ends', 'm', default=1.0, high=1e12, exclusive=True
     )
+    accelerometers: bool = False
 
     def __post_init__(self) -> None:
         """Validate."""
         check_fields(self)
         if not isinstance(self.machine, Machine):
             raise ParameterError('machine', self.machine, '', 'a Machine')
-        if not isinstance(self.tool_leaves_cut, (bool, np.bool_)):
-            raise ParameterError('tool_leaves_cut', self.tool_leaves_cut, '', 'True or False')
+        for name in ('tool_leaves_cut', 'accelerometers'):
+            value = getattr(self, name)
+            if not isinstance(value, (bool, np.bool_)):
+                raise ParameterError(name, value, '', 'True or False')
+            object.__setattr__(self, name, bool(value))
         if isinstance(self.seed, bool) or not isinstance(self.seed, (int, np.integer)):
             raise ParameterError('seed', self.seed, '', 'a whole number')
-        object.__setattr__(self, 'tool_leaves_cut', bool(self.tool_leaves_cut))
         object.__setattr__(self, 'seed', int(SEED.check('seed', self.seed)))

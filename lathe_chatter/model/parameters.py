@@ -228,9 +228,14 @@ SETUP_ROWS = (
     _setup_row('spindle_acceleration'),
     _setup_row('sample_rate'),
     Row('seed', 0, SEED.meaning, SEED),
+    Row(
+        'accelerometers',
+        default=False,
+        meaning='whether the samples have the accelerations of tool and workpiece too',
+    ),
 )
 """Of the force law and the sampling."""
-_LEAVES_CUT, _ACCELERATION, _SAMPLE_RATE, _SEED = SETUP_ROWS
+_LEAVES_CUT, _ACCELERATION, _SAMPLE_RATE, _SEED, _ACCELEROMETERS = SETUP_ROWS
 
 LATHE = ParameterTable(
     (
@@ -256,6 +261,7 @@ LATHE = ParameterTable(
         ),
         _SAMPLE_RATE,
         _SEED,
+        _ACCELEROMETERS,
         Row(
             'publish_clock',
             default=False,

@@ -16,7 +16,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from lathe_chatter.arrays import Array
 from lathe_chatter.nodes.messages import joint_states, time_message
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
-from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
 from lathe_chatter.samples.codec import encode_block, encode_number
 
 _SCALARS = {
@@ -78,10 +78,11 @@ class LatheTopics:
         """Publish what one tick brought, the state before the clock.
 
         Args:
-            samples: (n, 8), n > 0.
+            samples: (n, 8) or with accelerations (n, 10), n > 0.
             stamp: Simulated time of the last, ns.
         """
-        self._samples.publish(encode_block(samples))
+        columns = sample_columns(accelerometers=samples.shape[1] > len(SAMPLE_COLUMNS))
+        self._samples.publish(encode_block(samples, columns))
         self._look_around()
         last = samples[-1]
         for publisher, column in self._heard_scalars:

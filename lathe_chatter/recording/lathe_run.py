@@ -28,6 +28,7 @@ from lathe_chatter.recording.ros_messages import (
 from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 _COMMIT_PERIOD = 0.1
@@ -87,7 +88,7 @@ class LatheRun:
         self._add('/parameter_events', announced)
 
     def write(self, samples: Array) -> None:
-        """Write a block of samples (n, 8), n > 0; every 0.25 s also put it all on disk.
+        """Write a block of samples (n, 8) or (n, 10), n > 0; every 0.25 s also put it all on disk.
 
         Raises:
             LatheChatterError: If the disk has too little room left.
@@ -95,7 +96,8 @@ class LatheRun:
         """
         if self._simulated:
             self._now = self._begun + round(float(samples[-1, 0]) * _SECOND)
-        self._add(self._samples, encode_block(samples))
+        columns = sample_columns(accelerometers=samples.shape[1] > len(SAMPLE_COLUMNS))
+        self._add(self._samples, encode_block(samples, columns))
         if time.monotonic() - self._committed > _COMMIT_PERIOD:
             self.commit()
 

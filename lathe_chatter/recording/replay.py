@@ -15,7 +15,6 @@ from lathe_chatter.lathe.cut_events import BEGINNING, Change, Knock
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.recording.cut_log import CutLog, CutSession
 from lathe_chatter.recording.sample_reader import SampleBlocks
-from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _MAX_SAMPLES = 50_000
 """Samples that are computed at once where the record has none."""
@@ -93,7 +92,7 @@ class Replay:
         Raises:
             ReplayError: If the lathe cannot follow them; the text says why.
         """
-        if blocks.columns != SAMPLE_COLUMNS:
+        if blocks.columns != self._lathe.columns:
             raise ReplayError('The samples have other columns than this lathe computes.')
         for samples in self._stretches(blocks):
             difference = self._compare_stretch(samples)
@@ -142,7 +141,7 @@ class Replay:
                 self.compared += done + row
                 return Difference(
                     float(computed[row, 0]),
-                    SAMPLE_COLUMNS[column],
+                    self._lathe.columns[column],
                     float(recorded[row, column]),
                     float(computed[row, column]),
                 )

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from lathe_chatter.samples.columns import SAMPLE_COLUMNS, STATE_FIELDS
+from lathe_chatter.samples.columns import SAMPLE_COLUMNS, STATE_FIELDS, sample_columns
 
-__all__ = ['SAMPLE_COLUMNS', 'STATE_FIELDS']
+__all__ = ['SAMPLE_COLUMNS', 'STATE_FIELDS', 'sample_columns']

@@ -17,7 +17,6 @@ from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, knock_sentence
 from lathe_chatter.model.parameters import LATHE, described_by
 from lathe_chatter.recording import LatheRun
-from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.scenario.player import ScenarioPlayer
 from lathe_chatter.scenario.scenario import CLEARED, FLAGGED, Scenario, Step
 
@@ -149,7 +148,7 @@ class _Simulation:
         if len(samples):
             self._run.write(samples)
             if self._detector is not None:
-                self._hear(self._detector.update(samples, SAMPLE_COLUMNS))
+                self._hear(self._detector.update(samples, self._lathe.columns))
         return not self._lathe.guard
 
     def _sample_of(self, time: float) -> int:

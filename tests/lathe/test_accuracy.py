@@ -119,7 +119,7 @@ def test_a_turn_need_not_be_a_whole_number_of_samples(rpm: float, law: str) -> N
 def test_a_stiff_bearing_and_undamped_modes(law: str) -> None:
     """A bearing ten times as stiff as the spindle, met some hundred times.
 
-    Measured: 5.6e-13 at most, the steps being shorter for it.
+    Measured: 5.3e-11 at most.
     """
     machine = Machine(Mode(0.05, 775.0, 0.0), Mode(0.2, 400.0, 0.0), bearing_stiffness=3.2e5)
     cut = Cut(3000.0, 0.5e-3, 1e-6, BearingContact.GAP)
@@ -127,7 +127,7 @@ def test_a_stiff_bearing_and_undamped_modes(law: str) -> None:
         machine, cut, 0.5, sample_rate=_RATE, tool_leaves_cut=law == 'total', piece=2.5e-4
     )
     run = _run(cut, 0.5, machine, tool_leaves_cut=law == 'total')
-    assert relative_error(run.states, reference.states, _RATE, machine) < 1e-11
+    assert relative_error(run.states, reference.states, _RATE, machine) < 1e-9
     assert event_error(run.events, reference.events) < 1e-9
     assert len(run.events) > 50
 

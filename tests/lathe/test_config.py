@@ -40,7 +40,7 @@ def test_the_lathe_is_the_one_described() -> None:
         ({'tool.mass': -1.0}, 'tool.mass is -1.0 kg'),
         ({'tool_leaves_cut': 'yes'}, 'tool_leaves_cut'),
         ({'seed': 1.5}, 'seed'),
-        ({'bearing_contact': 'loose'}, 'none, gap, seated'),
+        ({'bearing_contact': 'loose'}, 'none, gap, seated, both_sides'),
     ],
 )
 def test_what_is_wrong_is_named(values: dict[str, object], words: str) -> None:

@@ -76,7 +76,7 @@ def test_delay_and_feed_are_those_of_a_turn() -> None:
         ),
         (
             {'bearing_contact': 'loose'},
-            "bearing_contact is 'loose': it must be one of none, gap, seated.",
+            "bearing_contact is 'loose': it must be one of none, gap, seated, both_sides.",
         ),
         (
             {'speed_variation_frequency': 0.0},

@@ -24,7 +24,7 @@ WRONG = {
         "depth_of_cut is 'deep' m: it must be a finite number from 0 to 0.1 m."
     ),
     (LATHE, 'bearing_contact:=loose'): (
-        "bearing_contact is 'loose': it must be one of none, gap, seated."
+        "bearing_contact is 'loose': it must be one of none, gap, seated, both_sides."
     ),
     (LATHE, 'seed:=1.0'): 'seed is 1.0: it must be a whole number from 0 to 2147483647.',
     (LATHE, 'sample_rate:=1250'): (

@@ -8,152 +8,183 @@ ends. Each piece between is solved exactly (propagation.py) and leaves a node of
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import propagation, surface
+from lathe_chatter.lathe.integrator import piece as at
 from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.lathe.integrator.events import NEVER, first_crossing, may_turn_back
-from lathe_chatter.lathe.integrator.plan import (
-    ANGLE_1,
-    ANGLE_LOW_1,
-    BEND_0,
-    BEND_1,
-    CURVATURE_1,
-    DURATION,
-    FED_1,
-    FED_LOW_1,
-    HEIGHT_1,
-    MET_0,
-    MET_1,
-    RATE_0,
-    RATE_1,
-    SLOPE_1,
-    SPEED_1,
-    SPEED_SLOPE_1,
-    Scratch,
-    plan_piece,
-)
+from lathe_chatter.lathe.integrator.piece import by_time, plan_piece
 from lathe_chatter.lathe.integrator.propagation import (
-    ENGAGED,
-    IN_CUT,
     TERMS,
-    relative_acceleration,
+    Shape,
+    add_held_forces,
+    add_unbalance,
+    coordinates_at,
+    in_registers,
+    quintic,
+    read_outputs,
+    solve_piece,
     whole_step,
 )
-from lathe_chatter.lathe.integrator.spindle import speed_and_slope
-from lathe_chatter.lathe.integrator.surface_kinks import finish_corner, lower
+from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
+from lathe_chatter.lathe.integrator.state_layout import (
+    BEARING_V,
+    BEARING_X,
+    TOOL_V,
+    TOOL_X,
+    WORKPIECE_V,
+    WORKPIECE_X,
+)
+from lathe_chatter.lathe.integrator.surface_kinks import bend_of, by_place, finish_corner, lower
+from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 
 _MOST_FLIPS = 32
 """Events in one step before it is finished without looking for more: a grazing contact that
 rounding cannot decide is no reason to stand still."""
+_ABOVE, _BELOW, _CHIP, _NOTHING = 0, 1, 2, -1
+"""What is watched: either side of the bearing, and the chip."""
+
+
+class Machine(NamedTuple):
+    """The coefficients of all regimes, see `coefficients.Constants`."""
+
+    rules: Array  # (REGIMES, ROWS, 2n)
+    outputs: Array  # (REGIMES, 2n + 1, OUTPUTS)
+    direct: Array  # (REGIMES, DIRECT)
+    moves: Array  # (REGIMES, REGIMES, 2n + 1, 2n)
+    matrices: Array  # (REGIMES, 2, 2n, 2n)
+
+
+class Scratch(NamedTuple):
+    """Room to work in, so that no piece has to ask for memory."""
+
+    piece: Array  # (PIECE_SIZE,)
+    end: Array  # coordinates at the end of the piece (2n,)
+    seen: Array  # what they mean (OUTPUTS,)
+    series: Array  # (TERMS, 2n)
+    work: Array  # (5, 2n + TERMS)
+    hold: Array  # the quintic of the surface met (6,)
+    turning: Array  # that of the force of an unbalance (6,)
+    forces: Array  # (6,)
+    margin: Array  # of an event (TERMS,)
 
 
 @compiled(inline=True, borrows=True)
 def _solve_series(
-    numbers: Array, regime: int, mechanics: Array, force: float, scratch: Scratch
-) -> None:
-    """The power series of the planned piece."""
-    piece = scratch.piece
-    duration = piece[DURATION]
-    square = duration * duration
-    propagation.quintic(
-        piece[MET_0], piece[RATE_0] * duration, piece[BEND_0] * square,
-        piece[MET_1], piece[RATE_1] * duration, piece[BEND_1] * square, scratch.hold,
-    )  # fmt: skip
-    propagation.solve_piece(
-        numbers, duration, regime, mechanics, force, scratch.hold, scratch.tool, scratch.workpiece
-    )
-
-
-@compiled(inline=True, borrows=True)
-def _solve(
-    numbers: Array, regime: int, mechanics: Array, matrices: Array, force: float, step: float,
-    scratch: Scratch,
+    z: Array, regime: int, machine: Machine, scratch: Scratch, ends: tuple[float, ...],
+    shape: Shape,
 ) -> None:  # fmt: skip
-    """The state at the end of the planned piece: by matrix if it is a whole step."""
-    piece, end = scratch.piece, scratch.end
-    if piece[DURATION] == step:
-        end[0], end[1], end[2], end[3] = whole_step(
-            matrices[regime], numbers[layout.TOOL_X], numbers[layout.TOOL_V],
-            numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V],
-            piece[MET_0], piece[RATE_0], piece[BEND_0],
-            piece[MET_1], piece[RATE_1], piece[BEND_1],
+    """The power series of the planned piece; `ends` are those of the force of an unbalance."""
+    piece = scratch.piece
+    duration = piece[at.DURATION]
+    square = duration * duration
+    quintic(
+        piece[at.MET_0], piece[at.RATE_0] * duration, piece[at.BEND_0] * square,
+        piece[at.MET_1], piece[at.RATE_1] * duration, piece[at.BEND_1] * square, scratch.hold,
+    )  # fmt: skip
+    if scratch.forces[2] != 0.0:
+        quintic(
+            ends[0], ends[1] * duration, ends[2] * square,
+            ends[3], ends[4] * duration, ends[5] * square, scratch.turning,
         )  # fmt: skip
-        if force != 0.0:
-            for k in range(4):
-                end[k] += matrices[regime, propagation.FORCE_ROW, k] * force
-    else:
-        _solve_series(numbers, regime, mechanics, force, scratch)
-        propagation.state_at(scratch.tool, scratch.workpiece, 1.0, piece[DURATION], end)
+    solve_piece(
+        z, duration, machine.rules[regime], machine.matrices[regime, 0],
+        machine.direct[regime, layout.COUPLED] != 0.0, scratch.forces, scratch.hold,
+        scratch.turning, scratch.series, scratch.work, scratch.end, shape,
+    )  # fmt: skip
 
 
 @compiled(inline=True, borrows=True)
-def _find_event(
-    numbers: Array, regime: int, mechanics: Array, settings: Array, force: float, scratch: Scratch
-) -> tuple[float, int]:
-    """The first event in the solved piece and its place in [0, 1], or `NEVER`."""
-    piece, end, margin = scratch.piece, scratch.end, scratch.margin
-    duration, clearance = piece[DURATION], mechanics[propagation.CLEARANCE]
-    watch_bearing = watch_chip = False
-    engaged, cutting = regime & ENGAGED != 0, regime & IN_CUT != 0
-    bearing_side, chip_side = 1.0 if engaged else -1.0, 1.0 if cutting else -1.0
-    if settings[layout.HAS_CLEARANCE] != 0.0:
-        watch_bearing = may_turn_back(
-            bearing_side * (numbers[layout.WORKPIECE_X] - clearance),
-            bearing_side * numbers[layout.WORKPIECE_V],
-            bearing_side * (end[2] - clearance), bearing_side * end[3], duration,
-        )  # fmt: skip
-    if settings[layout.MAY_LEAVE_CUT] != 0.0:
-        relative = numbers[layout.TOOL_X] - numbers[layout.WORKPIECE_X]
-        approach = numbers[layout.TOOL_V] - numbers[layout.WORKPIECE_V]
-        watch_chip = may_turn_back(
-            chip_side * (relative - piece[MET_0]), chip_side * (approach - piece[RATE_0]),
-            chip_side * (end[0] - end[2] - piece[MET_1]),
-            chip_side * (end[1] - end[3] - piece[RATE_1]), duration,
-        )  # fmt: skip
-    if not (watch_bearing or watch_chip):
-        return NEVER, layout.NO_EVENT
-    _solve_series(numbers, regime, mechanics, force, scratch)
-    place, event = NEVER, layout.NO_EVENT
-    if watch_bearing:
+def _first_event(
+    numbers: Array, regime: int, machine: Machine, settings: Array, scratch: Scratch,
+    solved: bool, shape: Shape,
+) -> tuple[float, int, bool]:  # fmt: skip
+    """The first event in the planned piece.
+
+    Args:
+        numbers: The remembered numbers, at the start of the piece.
+        regime: There.
+        machine: The coefficients.
+        settings: What machine and cut ask for.
+        scratch: With the outputs at the end of the piece, and the series if it is `solved`.
+        solved: Whether the series is there; else the first margin that may turn back ends this.
+        shape: One entry a mode.
+
+    Returns:
+        Its place in [0, 1] or `NEVER`, what it is, and whether the series is wanted.
+    """
+    piece, seen, margin = scratch.piece, scratch.seen, scratch.margin
+    outputs, n2 = machine.outputs[regime], 2 * len(shape)
+    duration, clearance = piece[at.DURATION], settings[layout.CLEARANCE]
+    touch, place, event = regime >> 1, NEVER, _NOTHING
+    for kind in range(3):
+        if kind == _CHIP:
+            if settings[layout.MAY_LEAVE_CUT] == 0.0:
+                continue
+            side = 1.0 if regime & layout.IN_CUT != 0 else -1.0
+            start = side * (numbers[layout.RELATIVE] - piece[at.MET_0])
+            slope = side * (numbers[layout.RELATIVE_RATE] - piece[at.RATE_0])
+            end = side * (seen[TOOL_X] - seen[WORKPIECE_X] - piece[at.MET_1])
+            slope_end = side * (seen[TOOL_V] - seen[WORKPIECE_V] - piece[at.RATE_1])
+        else:
+            elsewhere = touch != layout.FREE and touch != kind + 1
+            if settings[layout.SIDES] <= kind or elsewhere:
+                continue
+            sign = 1.0 if kind == _ABOVE else -1.0
+            side = -sign if touch == layout.FREE else sign
+            start = side * (numbers[layout.AT_BEARING] - sign * clearance)
+            slope = side * numbers[layout.AT_BEARING_RATE]
+            end = side * (seen[BEARING_X] - sign * clearance)
+            slope_end = side * seen[BEARING_V]
+        if not may_turn_back(start, slope, end, slope_end, duration):
+            continue
+        if not solved:
+            return NEVER, _NOTHING, True
         for k in range(TERMS):
-            margin[k] = scratch.workpiece[k]
-        margin[0] -= clearance
-        place = first_crossing(margin, TERMS, bearing_side)
-        event = layout.BEARING_RELEASES if engaged else layout.BEARING_ENGAGES
-    if watch_chip:
-        for k in range(TERMS):
-            margin[k] = scratch.tool[k] - scratch.workpiece[k]
-        for k in range(6):
-            margin[k] -= scratch.hold[k]
-        chip_place = first_crossing(margin, TERMS, chip_side)
-        if chip_place < place:
-            place = chip_place
-            event = layout.TOOL_LEAVES if cutting else layout.TOOL_ENTERS
-    return (place, event) if place <= 1.0 else (NEVER, layout.NO_EVENT)
+            total = 0.0
+            if kind == _CHIP:
+                for i in range(n2):
+                    total += (outputs[i, TOOL_X] - outputs[i, WORKPIECE_X]) * scratch.series[k, i]
+                if k < 6:
+                    total -= scratch.hold[k]
+            else:
+                for i in range(n2):
+                    total += outputs[i, BEARING_X] * scratch.series[k, i]
+            margin[k] = side * total
+        if kind == _CHIP:
+            margin[0] += side * (outputs[n2, TOOL_X] - outputs[n2, WORKPIECE_X])
+        else:
+            margin[0] += side * (outputs[n2, BEARING_X] - sign * clearance)
+        found = first_crossing(margin, end, slope_end * duration)
+        if found < place:
+            place, event = found, kind
+    return (place, event, False) if place <= 1.0 else (NEVER, _NOTHING, False)
 
 
 @compiled(inline=True, borrows=True)
 def _leave_surface(
-    counts: Integers, nodes: Array, settings: Array, matrices: Array, force: float, step: float,
-    scratch: Scratch,
-) -> None:  # fmt: skip
+    counts: Integers, nodes: Array, settings: Array, bend: float, scratch: Scratch
+) -> None:
     """Add the node at the end of a piece: cut by the tool, or the old surface where it is out."""
-    piece, end, regime = scratch.piece, scratch.end, counts[layout.REGIME]
-    height, slope, curvature = piece[HEIGHT_1], piece[SLOPE_1], piece[CURVATURE_1]
-    speed, pitch = piece[SPEED_1], piece[SPEED_1] * step
-    if regime & IN_CUT != 0:
-        bend = relative_acceleration(
-            matrices[regime], end[0], end[1], end[2], end[3], piece[MET_1], force
-        )
-        height = piece[FED_1] + end[0] - end[2]
-        slope = (settings[layout.FEED_SPEED] + end[1] - end[3]) * (1.0 / speed)
-        curvature = (bend - slope * piece[SPEED_SLOPE_1]) * (1.0 / (speed * speed))
+    piece, seen = scratch.piece, scratch.seen
+    height = piece[at.HEIGHT_1] - settings[layout.FEED]
+    slope, curvature = piece[at.SLOPE_1], piece[at.CURVATURE_1]
+    pitch = piece[at.SPEED_1]
+    if counts[layout.REGIME] & layout.IN_CUT != 0:
+        height = seen[TOOL_X] - seen[WORKPIECE_X] + piece[at.AHEAD_1]
+        slope, curvature = by_place(
+            seen[TOOL_V] - seen[WORKPIECE_V], bend, settings[layout.LEAD], piece[at.SPEED_1],
+            piece[at.ACCELERATION_1],
+        )  # fmt: skip
     else:
         pitch = min(pitch, nodes[counts[layout.POINTER] + 1, surface.PITCH])
     counts[layout.HEAD] += 1
-    surface.write_node(nodes, counts[layout.HEAD], piece[ANGLE_1], height, slope, curvature, pitch)
+    surface.write_node(
+        nodes, counts[layout.HEAD], piece[at.PLACE_1], height, slope, curvature, pitch
+    )
 
 
 @compiled(inline=True, borrows=True)
@@ -161,128 +192,217 @@ def _move_on(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, node: int,
     at_node: bool, ramp_ends: bool, scratch: Scratch,
 ) -> None:  # fmt: skip
-    """Make the end of the piece the present."""
-    piece = scratch.piece
-    numbers[layout.MET] = piece[HEIGHT_1]
-    numbers[layout.MET_SLOPE], numbers[layout.MET_CURVATURE] = (
-        piece[SLOPE_1],
-        piece[CURVATURE_1],
-    )
+    """Make the end of the piece the present, but for the coordinates."""
+    piece, seen = scratch.piece, scratch.seen
+    numbers[layout.HEIGHT] = piece[at.HEIGHT_1]
+    numbers[layout.SLOPE], numbers[layout.CURVATURE] = piece[at.SLOPE_1], piece[at.CURVATURE_1]
+    if at_node:
+        numbers[layout.CURVATURE] = nodes[node, surface.CURVATURE_AFTER]
     if at_node and nodes[node, surface.ORDER] <= surface.LAST_ORDER:
-        numbers[layout.MET_SLOPE] = nodes[node, surface.SLOPE_AFTER]
-        numbers[layout.MET_CURVATURE] = nodes[node, surface.CURVATURE_AFTER]
+        numbers[layout.SLOPE] = nodes[node, surface.SLOPE_AFTER]
         # A corner comes back two orders smoother, through a force; or as it was, uncut.
         order = int(nodes[node, surface.ORDER])
-        if counts[layout.REGIME] & IN_CUT == 0:
+        if counts[layout.REGIME] & layout.IN_CUT == 0:
             counts[layout.SURFACE_CORNER] = order
         elif order + 2 <= surface.LAST_ORDER:
             counts[layout.CORNER] = order + 2
-    for k in range(4):
-        numbers[k] = scratch.end[k]
-    numbers[layout.ANGLE], numbers[layout.ANGLE_LOW] = (
-        piece[ANGLE_1],
-        piece[ANGLE_LOW_1],
-    )
-    numbers[layout.FED], numbers[layout.FED_LOW] = piece[FED_1], piece[FED_LOW_1]
-    numbers[layout.SPEED] += slope * piece[DURATION]
+    numbers[layout.RELATIVE] = seen[TOOL_X] - seen[WORKPIECE_X]
+    numbers[layout.RELATIVE_RATE] = seen[TOOL_V] - seen[WORKPIECE_V]
+    numbers[layout.AT_BEARING] = seen[BEARING_X]
+    numbers[layout.AT_BEARING_RATE] = seen[BEARING_V]
+    numbers[layout.PLACE], numbers[layout.AHEAD] = piece[at.PLACE_1], piece[at.AHEAD_1]
+    numbers[layout.SPEED] += slope * piece[at.DURATION] * settings[layout.TARGET_SPEED]
     if ramp_ends:
         numbers[layout.SPEED] = settings[layout.TARGET_SPEED]
         counts[layout.CORNER] = lower(counts[layout.CORNER], 2)
     if settings[layout.VARIATION] > 0.0:
-        phase = numbers[layout.PHASE] + settings[layout.VARIATION_FREQUENCY] * piece[DURATION]
+        phase = numbers[layout.PHASE]
+        phase += settings[layout.VARIATION_FREQUENCY] * piece[at.DURATION]
         numbers[layout.PHASE] = phase - math.floor(phase)
     counts[layout.POINTER] = node
-    counts[layout.PIECES] += 1
-    if numbers[layout.ANGLE] >= 1.0:
-        surface.next_turn(nodes, node, counts[layout.HEAD], numbers[layout.FED])
-        counts[layout.HEAD] -= node
-        counts[layout.POINTER] = 0
-        counts[layout.TURNS] += 1
-        numbers[layout.ANGLE] -= 1.0
-        numbers[layout.MET] -= numbers[layout.FED]
-        numbers[layout.FED] = 0.0
 
 
-@compiled(borrows=True)
+@compiled(inline=True, borrows=True)
+def _kind_of(event: int, regime: int) -> tuple[int, int]:
+    """The kind of an event as it is told, and the regime after it."""
+    if event == _CHIP:
+        leaves = regime & layout.IN_CUT != 0
+        return layout.TOOL_LEAVES if leaves else layout.TOOL_ENTERS, regime ^ layout.IN_CUT
+    if regime >> 1 == layout.FREE:
+        return layout.BEARING_ENGAGES, regime + 2 * (event + 1)
+    return layout.BEARING_RELEASES, regime & layout.IN_CUT
+
+
+@compiled(inline=True, borrows=True)
 def take_step(
-    numbers: Array, counts: Integers, nodes: Array, settings: Array, mechanics: Array,
-    matrices: Array, force: float, events: Array, found: int, scratch: Scratch,
+    numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
+    on_tool: float, between: float, events: Array, found: int, scratch: Scratch, shape: Shape,
 ) -> tuple[int, int]:  # fmt: skip
-    """Take the step that is next, or finish one that was begun; arrays as in `stepper.advance`.
+    """Take a whole step, or go on with one that was interrupted, whatever happens in it.
 
     Args:
-        force: On the tool, held over the step, N.
+        numbers: The remembered numbers.
+        z: The coordinates (2n,).
+        counts: The remembered integers.
+        nodes: The surface.
+        settings: What machine and cut ask for.
+        machine: The coefficients of all regimes.
+        on_tool: The random force on the tool in this sample, N.
+        between: That between tool and workpiece, while they touch, N.
+        events: Written: samples before the event, s since that sample, kind.
         found: Events written so far.
+        scratch: Room; `scratch.seen` is left with what the end of the step means.
+        shape: One entry a mode.
 
     Returns:
         Events written so far, and FINISHED; or, with the rest of the step noted, SURFACE_FULL
         or EVENTS_FULL.
     """
-    piece = scratch.piece
-    step = 1.0 / (settings[layout.SAMPLE_RATE] * counts[layout.STEPS])
-    merge = surface.MERGE * step
+    n2 = 2 * len(shape)
+    piece, end, seen, forces = scratch.piece, scratch.end, scratch.seen, scratch.forces
+    merge, lead, target = surface.MERGE, settings[layout.LEAD], settings[layout.TARGET_SPEED]
+    variation, frequency = settings[layout.VARIATION], settings[layout.VARIATION_FREQUENCY]
+    unbalanced, damping = settings[layout.UNBALANCE] != 0.0, settings[layout.PROCESS_DAMPING]
+    noisy = on_tool != 0.0 or between != 0.0
     if numbers[layout.LEFT] == 0.0:
-        numbers[layout.LEFT], counts[layout.FLIPS] = step, 0
+        numbers[layout.LEFT], counts[layout.FLIPS] = 1.0, 0
     while numbers[layout.LEFT] > 0.0:
         if counts[layout.HEAD] + 2 >= nodes.shape[0]:
             return found, layout.SURFACE_FULL
         if found == events.shape[0]:
             return found, layout.EVENTS_FULL
-        slope = 0.0
-        if numbers[layout.SPEED] != settings[layout.TARGET_SPEED]:
-            slope = math.copysign(
-                settings[layout.ACCELERATION],
-                settings[layout.TARGET_SPEED] - numbers[layout.SPEED],
-            )
-        speed, acceleration = numbers[layout.SPEED], 0.0
-        if slope != 0.0 or settings[layout.VARIATION] != 0.0:
+        base, slope = numbers[layout.SPEED] / target, 0.0
+        if numbers[layout.SPEED] != target:
+            slope = math.copysign(settings[layout.ACCELERATION], 1.0 - base)
+        unsteady = slope != 0.0 or variation != 0.0
+        speed, acceleration = base, 0.0
+        if unsteady:
             speed, acceleration = speed_and_slope(
-                numbers[layout.SPEED], slope, settings[layout.VARIATION],
-                numbers[layout.PHASE], settings[layout.VARIATION_FREQUENCY],
-            )  # fmt: skip
-        if counts[layout.CORNER] > 0 or counts[layout.SURFACE_CORNER] > 0:
-            finish_corner(numbers, counts, nodes, settings, matrices, force, speed, acceleration)
-        piece[MET_0] = numbers[layout.MET] - numbers[layout.FED]
-        piece[RATE_0] = numbers[layout.MET_SLOPE] * speed - settings[layout.FEED_SPEED]
-        piece[BEND_0] = (
-            numbers[layout.MET_CURVATURE] * (speed * speed)
-            + numbers[layout.MET_SLOPE] * acceleration
-        )
+                base, slope, variation, numbers[layout.PHASE], frequency
+            )
         regime, left = counts[layout.REGIME], numbers[layout.LEFT]
-        node, at_node, ramp_ends = plan_piece(
-            numbers, counts, nodes, settings, slope, left, merge, piece
+        rules, direct = machine.rules[regime], machine.direct[regime]
+        in_cut = regime & layout.IN_CUT != 0
+        varies = unsteady and damping != 0.0 and in_cut
+        piece[at.MET_0] = numbers[layout.HEIGHT] - settings[layout.FEED] - numbers[layout.AHEAD]
+        piece[at.RATE_0], piece[at.BEND_0] = by_time(
+            numbers[layout.SLOPE], numbers[layout.CURVATURE], lead, speed, acceleration
         )
-        _solve(numbers, regime, mechanics, matrices, force, step, scratch)
-        event = layout.NO_EVENT
-        if counts[layout.FLIPS] < _MOST_FLIPS:
-            place, event = _find_event(numbers, regime, mechanics, settings, force, scratch)
-        if event != layout.NO_EVENT:
-            until = place * piece[DURATION]
-            if merge < until < piece[DURATION] - merge:
+        f0 = g0 = h0 = f1 = g1 = h1 = 0.0
+        if unbalanced:
+            f0, g0, h0 = unbalance_force(
+                settings, angle_at(numbers, settings, numbers[layout.PLACE]), speed,
+                acceleration,
+                speed_curvature(base, slope, variation, numbers[layout.PHASE], frequency),
+            )  # fmt: skip
+        begins = noisy and counts[layout.STEP] == 0 and left == 1.0  # other random forces
+        if begins or counts[layout.CORNER] > 0 or counts[layout.SURFACE_CORNER] > 0:
+            more = damping * (1.0 / speed - 1.0) * numbers[layout.RELATIVE_RATE] if varies else 0.0
+            bend = bend_of(
+                z, machine.outputs[regime], direct, piece[at.MET_0], on_tool, between - more, f0
+            )
+            finish_corner(numbers, counts, nodes, settings, bend, speed, acceleration)
+        node, at_node, ramp_ends = plan_piece(numbers, counts, nodes, settings, slope, left, piece)
+        place, event, extra = NEVER, _NOTHING, 0.0
+        for attempt in range(2):
+            duration = piece[at.DURATION]
+            if unbalanced:
+                phase = numbers[layout.PHASE] + frequency * duration
+                f1, g1, h1 = unbalance_force(
+                    settings, angle_at(numbers, settings, piece[at.PLACE_1]),
+                    piece[at.SPEED_1], piece[at.ACCELERATION_1],
+                    speed_curvature(base + slope * duration, slope, variation, phase, frequency),
+                )  # fmt: skip
+            if varies:
+                middle, _ = speed_and_slope(
+                    base + 0.5 * slope * duration, slope, variation,
+                    numbers[layout.PHASE] + 0.5 * frequency * duration, frequency,
+                )  # fmt: skip
+                first, half = damping * (1.0 / speed - 1.0), damping * (1.0 / middle - 1.0)
+                extra = damping * (1.0 / piece[at.SPEED_1] - 1.0)
+                forces[3], forces[4], forces[5] = (
+                    first,
+                    4.0 * half - 3.0 * first - extra,
+                    2.0 * first - 4.0 * half + 2.0 * extra,
+                )
+            solved = attempt == 1 or varies or duration != 1.0
+            if solved:
+                forces[0], forces[1] = on_tool, between
+                forces[2] = 2.0 if varies else 1.0 if unbalanced else 0.0
+                _solve_series(z, regime, machine, scratch, (f0, g0, h0, f1, g1, h1), shape)
+            else:
+                there = whole_step(
+                    in_registers(z, shape), rules, machine.matrices[regime, 1],
+                    direct[layout.COUPLED] != 0.0, in_cut,
+                    piece[at.MET_0], piece[at.RATE_0], piece[at.BEND_0],
+                    piece[at.MET_1], piece[at.RATE_1], piece[at.BEND_1], shape,
+                )  # fmt: skip
+                if noisy:
+                    there = add_held_forces(rules, on_tool, between, there, shape)
+                if unbalanced:
+                    there = add_unbalance(rules, f0, g0, h0, f1, g1, h1, there, shape)
+                for i in range(n2):
+                    end[i] = there[i]
+            read_outputs(machine.outputs[regime], end, seen, shape)
+            if counts[layout.FLIPS] >= _MOST_FLIPS:
+                break
+            place, event, again = _first_event(
+                numbers, regime, machine, settings, scratch, solved, shape
+            )
+            if not again:
+                break
+        kind, after = layout.NO_EVENT, regime
+        if event != _NOTHING:
+            until = place * piece[at.DURATION]
+            if merge < until < piece[at.DURATION] - merge:
                 # Inside: the piece ends here, on the series in which the event was found.
-                propagation.state_at(
-                    scratch.tool, scratch.workpiece, place, piece[DURATION], scratch.end
-                )
+                coordinates_at(scratch.series, place, end, shape)
+                read_outputs(machine.outputs[regime], end, seen, shape)
                 node, at_node, ramp_ends = plan_piece(
-                    numbers, counts, nodes, settings, slope, until, merge, piece
+                    numbers, counts, nodes, settings, slope, until, piece
                 )
+                if varies:
+                    extra = damping * (1.0 / piece[at.SPEED_1] - 1.0)
+                if unbalanced:
+                    f1, _, _ = unbalance_force(
+                        settings, angle_at(numbers, settings, piece[at.PLACE_1]),
+                        piece[at.SPEED_1], 0.0, 0.0,
+                    )  # fmt: skip
             elif until <= merge:
-                piece[DURATION] = 0.0
+                piece[at.DURATION] = 0.0
+            kind, after = _kind_of(event, regime)
             events[found, 0] = counts[layout.SAMPLES]
-            events[found, 1] = (counts[layout.STEP] + 1) * step - left + piece[DURATION]
-            events[found, 2] = event
+            events[found, 1] = settings[layout.STEP_LENGTH] * (
+                counts[layout.STEP] + 1.0 - left + piece[at.DURATION]
+            )
+            events[found, 2] = kind
             found += 1
             counts[layout.FLIPS] += 1
-        if piece[DURATION] > 0.0:
-            _leave_surface(counts, nodes, settings, matrices, force, step, scratch)
+        if piece[at.DURATION] > 0.0:
+            more = extra * (seen[TOOL_V] - seen[WORKPIECE_V])
+            bend = bend_of(
+                end, machine.outputs[regime], direct, piece[at.MET_1], on_tool, between - more, f1
+            )
+            _leave_surface(counts, nodes, settings, bend, scratch)
             _move_on(numbers, counts, nodes, settings, slope, node, at_node, ramp_ends, scratch)
-            left -= piece[DURATION]
+            left -= piece[at.DURATION]
             numbers[layout.LEFT] = left if left > 0.5 * merge else 0.0
-        if event >= layout.TOOL_LEAVES:
+            for i in range(n2):
+                z[i] = end[i]
+        if kind == layout.NO_EVENT:
+            continue
+        moves = machine.moves[regime, after]
+        for i in range(n2):
+            end[i] = moves[n2, i]
+        for i in range(n2):
+            for j in range(n2):
+                end[i] += moves[i, j] * z[j]
+        for i in range(n2):
+            z[i] = end[i]
+        counts[layout.REGIME] = after
+        if kind >= layout.TOOL_LEAVES:
             # Out of the cut the surface is another: it has a corner, whatever the motion has.
-            counts[layout.REGIME] ^= IN_CUT
             counts[layout.SURFACE_CORNER] = 1
-        elif event != layout.NO_EVENT:
-            counts[layout.REGIME] ^= ENGAGED
+        else:
             counts[layout.CORNER] = lower(counts[layout.CORNER], 3)
     return found, layout.FINISHED

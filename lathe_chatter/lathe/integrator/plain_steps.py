@@ -1,157 +1,317 @@
 """Whole steps in which nothing happens, as fast as they can be taken.
 
-Nearly every step of a run is one: steady speed, no corner in the surface that the tool meets,
-no change of contact or cutting. This loop takes such steps with everything in registers and
-stops before the first that is not, which pieces.py then takes.
+Nearly every step of a run is one: no corner in the surface that the tool meets, no change of
+contact or cutting. This loop takes such steps, with noise, unbalance and a varied speed, and stops
+before the first that is not; event_step.py then takes that one.
+
+At a steady speed the surface of the turn before was left on a grid of whole steps. Where a turn
+has a whole number of them the tool meets its nodes, else a constant part of the way between two.
 """
 
 from __future__ import annotations
 
+import math
+
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
+from lathe_chatter.lathe.integrator import noise, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.lathe.integrator.events import may_turn_back
-from lathe_chatter.lathe.integrator.plan import DETAIL, add
+from lathe_chatter.lathe.integrator.piece import DETAIL, by_time
 from lathe_chatter.lathe.integrator.propagation import (
-    CLEARANCE,
-    ENGAGED,
-    IN_CUT,
-    relative_acceleration,
+    Shape,
+    add_held_forces,
+    add_unbalance,
+    in_registers,
+    read_outputs,
     whole_step,
 )
-from lathe_chatter.lathe.integrator.samples import write_sample
-from lathe_chatter.lathe.integrator.surface_kinks import finish_corner
+from lathe_chatter.lathe.integrator.samples import (
+    COLUMNS,
+    add_runout,
+    write_accelerations,
+    write_sample,
+)
+from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
+from lathe_chatter.lathe.integrator.state_layout import (
+    BEARING_V,
+    BEARING_X,
+    BEND,
+    TOOL_V,
+    TOOL_X,
+    WORKPIECE_V,
+    WORKPIECE_X,
+)
+from lathe_chatter.lathe.integrator.surface_kinks import bend_of, by_place, finish_corner
+from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 
 
-@compiled(borrows=True)
-def take_quiet_steps(
-    numbers: Array,
-    counts: Integers,
-    nodes: Array,
-    settings: Array,
-    mechanics: Array,
-    matrices: Array,
-    out: Array,
-    row: int,
-) -> int:
-    """Take quiet steps, beginning with sample `row`; arrays as in `stepper.advance`.
+@compiled(borrows=True, apart=True)
+def take_plain_steps(
+    numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, rules: Array,
+    outputs: Array, direct: Array, step_matrix: Array, out: Array, row: int,
+    seen: Array, shape: Shape,
+) -> int:  # fmt: skip
+    """Take plain steps, beginning with sample `row`.
+
+    Args:
+        numbers: As in `stepper.advance`.
+        z: The coordinates (2n,).
+        counts: As in `stepper.advance`.
+        nodes: The same.
+        settings: The same.
+        rules: The coefficients of the regime (ROWS, 2n).
+        outputs: What its coordinates mean (2n + 1, OUTPUTS).
+        direct: What acts directly (DIRECT,).
+        step_matrix: The response to a whole step where its coordinates are coupled (2n, 2n).
+        out: As in `stepper.advance`.
+        row: The sample that is next.
+        seen: Room (OUTPUTS,).
+        shape: One entry a mode.
 
     Returns:
         The sample that is next.
     """
-    speed, feed_speed = numbers[layout.SPEED], settings[layout.FEED_SPEED]
-    unsteady = speed != settings[layout.TARGET_SPEED] or settings[layout.VARIATION] != 0.0
-    begun = numbers[layout.LEFT] != 0.0
-    if unsteady or begun or settings[layout.FORCE_NOISE] != 0.0 or row == out.shape[0]:
+    n2 = 2 * len(shape)
+    target = settings[layout.TARGET_SPEED]
+    variation, damping = settings[layout.VARIATION], settings[layout.PROCESS_DAMPING]
+    varied = variation != 0.0
+    if (
+        numbers[layout.SPEED] != target
+        or (varied and damping != 0.0)
+        or numbers[layout.LEFT] != 0.0
+        or row == out.shape[0]
+    ):
         return row
-    if counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0:
-        finish_corner(numbers, counts, nodes, settings, matrices, 0.0, speed, 0.0)
-    steps, index = counts[layout.STEPS], counts[layout.STEP]
-    rate = settings[layout.SAMPLE_RATE]
-    step = 1.0 / (rate * steps)
-    rise, near = speed * step, surface.MERGE * step * speed
-    per_speed, square = 1.0 / speed, speed * speed
-    nominal = settings[layout.NOMINAL_FEED_SPEED] / speed
-    per_square, feed = 1.0 / square, feed_speed * step
-    limit = settings[layout.LIMIT]
-    may_leave = settings[layout.MAY_LEAVE_CUT] != 0.0
-    has_clearance = settings[layout.HAS_CLEARANCE] != 0.0
-    clearance = mechanics[CLEARANCE]
-    regime = counts[layout.REGIME]
-    matrix = matrices[regime]
-    in_cut = regime & IN_CUT != 0
-    stiffness = settings[layout.CUTTING_STIFFNESS] if in_cut else 0.0
-    bearing_side = 1.0 if regime & ENGAGED != 0 else -1.0
-    chip_side = 1.0 if in_cut else -1.0
+    lead, feed, turn = settings[layout.LEAD], settings[layout.FEED], settings[layout.TURN]
+    per_step, rate = 1.0 / settings[layout.STEP_LENGTH], settings[layout.SAMPLE_RATE]
+    limit, clearance = settings[layout.LIMIT], settings[layout.CLEARANCE]
+    stiffness, leaves = settings[layout.CUTTING_STIFFNESS], settings[layout.MAY_LEAVE_CUT] != 0.0
+    sides = settings[layout.SIDES]
+    runout = settings[layout.RUNOUT] != 0.0 or settings[layout.TOOL_RUNOUT] != 0.0
+    unbalanced = settings[layout.UNBALANCE] != 0.0
+    tool_noise, cut_noise = settings[layout.FORCE_NOISE], settings[layout.CUTTING_FORCE_NOISE]
+    noisy = tool_noise != 0.0 or cut_noise != 0.0
+    seed = int(settings[layout.SEED])
+    tool_key = noise.stream_key(seed, noise.FORCE_STREAM)
+    cut_key = noise.stream_key(seed, noise.CUTTING_FORCE_STREAM)
+    accelerations = out.shape[1] > COLUMNS
+    coupled = direct[layout.COUPLED] != 0.0
+    regime, steps = counts[layout.REGIME], counts[layout.STEPS]
+    in_cut, touch = regime & layout.IN_CUT != 0, regime >> 1
+    origin, origin_low, turns = numbers[layout.ORIGIN], numbers[layout.ORIGIN_LOW], 1.0 / turn
 
-    xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
-    xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
-    angle, angle_low = numbers[layout.ANGLE], numbers[layout.ANGLE_LOW]
-    fed, fed_low = numbers[layout.FED], numbers[layout.FED_LOW]
-    met, met_slope = numbers[layout.MET], numbers[layout.MET_SLOPE]
-    met_curvature = numbers[layout.MET_CURVATURE]
-    pointer, head = counts[layout.POINTER], counts[layout.HEAD]
-    samples, turns, pieces = (
-        counts[layout.SAMPLES],
-        counts[layout.TURNS],
-        counts[layout.PIECES],
+    place, phase = numbers[layout.PLACE], numbers[layout.PHASE]
+    frequency = settings[layout.VARIATION_FREQUENCY]
+    speed, acceleration = 1.0, 0.0
+    swing = math.tan(math.pi * frequency) / (math.pi * frequency) if varied else 1.0
+    if varied:
+        if frequency >= 0.25:
+            return row
+        speed, acceleration = speed_and_slope(1.0, 0.0, variation, phase, frequency)
+    whole_turn = math.ceil(turn)
+    part = whole_turn - turn
+    whole = part == 0.0
+    at_0, at_1, at_2 = layout.WEIGHTS, layout.WEIGHTS + 5, layout.WEIGHTS + 10
+    (w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, w12, w13, w14) = (
+        settings[at_0], settings[at_0 + 1], settings[at_0 + 2], settings[at_0 + 3],
+        settings[at_0 + 4], settings[at_1], settings[at_1 + 1], settings[at_1 + 2],
+        settings[at_1 + 3], settings[at_1 + 4], settings[at_2], settings[at_2 + 1],
+        settings[at_2 + 2], settings[at_2 + 3], settings[at_2 + 4],
+    )  # fmt: skip
+    ahead = numbers[layout.AHEAD]
+    height, slope, curvature = (
+        numbers[layout.HEIGHT],
+        numbers[layout.SLOPE],
+        numbers[layout.CURVATURE],
     )
-    u0, du0, ddu0 = met - fed, met_slope * speed - feed_speed, met_curvature * square
+    u0 = height - feed - ahead
+    d0, e0 = slope, curvature
+    if varied:
+        d0, e0 = by_time(slope, curvature, lead, speed, acceleration)
+    r0, s0 = numbers[layout.RELATIVE], numbers[layout.RELATIVE_RATE]
+    b0, v0 = numbers[layout.AT_BEARING], numbers[layout.AT_BEARING_RATE]
+    pointer, head = counts[layout.POINTER], counts[layout.HEAD]
+    samples, index, span = counts[layout.SAMPLES], counts[layout.STEP], settings[layout.SPAN]
+    on_tool = between = f0 = g0 = h0 = f1 = g1 = h1 = 0.0
+    if unbalanced:
+        f0, g0, h0 = unbalance_force(
+            settings, angle_at(numbers, settings, place), speed, acceleration,
+            speed_curvature(1.0, 0.0, variation, phase, frequency) if varied else 0.0,
+        )  # fmt: skip
+    if noisy:
+        on_tool = tool_noise * noise.normal(tool_key, samples)
+        between = cut_noise * noise.normal(cut_key, samples)
+    bend = bend_of(z, outputs, direct, u0, 0.0, 0.0, f0)
+    if counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0:
+        forced = direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
+        finish_corner(numbers, counts, nodes, settings, bend + forced, speed, acceleration)
 
-    while row < out.shape[0] and head + 2 < nodes.shape[0]:
-        new_angle, new_angle_low = add(angle, angle_low, rise)
-        if new_angle >= 1.0 or rise > DETAIL * nodes[pointer + 1, surface.PITCH]:
-            break
-        place = new_angle - 1.0
-        node = pointer
-        if nodes[node + 1, surface.ANGLE] < place - near:
-            node += 1
+    now = in_registers(z, shape)
+    while row < out.shape[0] and head + 2 < nodes.shape[0] and place < span:
+        if noisy and index == 0:
+            on_tool = tool_noise * noise.normal(tool_key, samples)
+            between = cut_noise * noise.normal(cut_key, samples)
+            if in_cut:
+                forced = (
+                    direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
+                )
+                nodes[head, surface.CURVATURE_AFTER] = by_place(
+                    s0, bend + forced, lead, speed, acceleration
+                )[1]
+        speed1, acceleration1, rise, ahead1, phase1 = 1.0, 0.0, 1.0, ahead, phase
+        if varied:
+            phase1 = phase + frequency
+            phase1 -= math.floor(phase1)
+            speed1, acceleration1 = speed_and_slope(1.0, 0.0, variation, phase1, frequency)
+            # The integral of a sine by its ends: 2 sin(middle) cos(z) = sin(start) + sin(end).
+            rise = 1.0 + (0.5 * (speed + speed1) - 1.0) * swing
+            ahead1 = ahead + lead * (1.0 - rise)
+        place1 = place + rise
+        at = place1 - turn
+        node = pointer + 1
+        base = place1 - whole_turn
+        if not varied and nodes[node, surface.PLACE] == base:
             if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
                 break
-        following = nodes[node + 1, surface.ANGLE]
-        if following > place + near:
-            next_met, next_slope, next_curvature = surface.surface_at(nodes, node, place)
-        else:
-            node += 1
-            if nodes[node, surface.ORDER] <= surface.LAST_ORDER or following < place - near:
+            if whole:
+                height1, slope1, curvature1 = (
+                    nodes[node, surface.HEIGHT],
+                    nodes[node, surface.SLOPE_BEFORE],
+                    nodes[node, surface.CURVATURE_BEFORE],
+                )
+                after = nodes[node, surface.CURVATURE_AFTER]
+            elif nodes[node + 1, surface.PLACE] == base + 1.0:
+                rising = nodes[node + 1, surface.HEIGHT] - nodes[node, surface.HEIGHT]
+                da, db = nodes[node, surface.SLOPE_AFTER], nodes[node + 1, surface.SLOPE_BEFORE]
+                ea = nodes[node, surface.CURVATURE_AFTER]
+                eb = nodes[node + 1, surface.CURVATURE_BEFORE]
+                height1 = (
+                    nodes[node, surface.HEIGHT]
+                    + ((w0 * rising + w1 * da) + (w2 * db + w3 * ea)) + w4 * eb
+                )  # fmt: skip
+                slope1 = ((w5 * rising + w6 * da) + (w7 * db + w8 * ea)) + w9 * eb
+                curvature1 = ((w10 * rising + w11 * da) + (w12 * db + w13 * ea)) + w14 * eb
+                after = curvature1
+            elif nodes[node + 1, surface.PLACE] > at + surface.MERGE:
+                height1, slope1, curvature1 = surface.surface_at(nodes, node, at)
+                after = curvature1
+            else:
                 break
-            next_met = nodes[node, surface.HEIGHT]
-            next_slope = nodes[node, surface.SLOPE_BEFORE]
-            next_curvature = nodes[node, surface.CURVATURE_BEFORE]
-        new_fed, new_fed_low = add(fed, fed_low, feed)
-        u1 = next_met - new_fed
-        du1, ddu1 = next_slope * speed - feed_speed, next_curvature * square
-        xt1, vt1, xw1, vw1 = whole_step(matrix, xt, vt, xw, vw, u0, du0, ddu0, u1, du1, ddu1)
-        chip = xt1 - xw1 - u1
-        if has_clearance and may_turn_back(
-            bearing_side * (xw - clearance), bearing_side * vw,
-            bearing_side * (xw1 - clearance), bearing_side * vw1, step,
-        ):  # fmt: skip
-            break
-        if may_leave and may_turn_back(
-            chip_side * (xt - xw - u0), chip_side * (vt - vw - du0),
-            chip_side * chip, chip_side * (vt1 - vw1 - du1), step,
-        ):  # fmt: skip
-            break
-        if not (abs(xt1) <= limit and abs(xw1) <= limit):
+        else:
+            if rise > DETAIL * nodes[node, surface.PITCH]:
+                break
+            node = pointer
+            while (
+                nodes[node + 1, surface.PLACE] < at - surface.MERGE
+                and nodes[node + 1, surface.ORDER] > surface.LAST_ORDER
+            ):
+                node += 1
+            following = nodes[node + 1, surface.PLACE]
+            if following < at - surface.MERGE:
+                break
+            if following <= at + surface.MERGE:
+                node += 1
+                if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
+                    break
+                height1, slope1, curvature1 = (
+                    nodes[node, surface.HEIGHT],
+                    nodes[node, surface.SLOPE_BEFORE],
+                    nodes[node, surface.CURVATURE_BEFORE],
+                )
+                after = nodes[node, surface.CURVATURE_AFTER]
+            else:
+                height1, slope1, curvature1 = surface.surface_at(nodes, node, at)
+                after = curvature1
+        u1, d1, e1 = height1 - feed - ahead1, slope1, curvature1
+        if varied:
+            d1, e1 = by_time(slope1, curvature1, lead, speed1, acceleration1)
+        end = whole_step(now, rules, step_matrix, coupled, in_cut, u0, d0, e0, u1, d1, e1, shape)
+        if noisy:
+            end = add_held_forces(rules, on_tool, between, end, shape)
+        if unbalanced:
+            f1, g1, h1 = unbalance_force(
+                settings, angle_at(numbers, settings, place1), speed1, acceleration1,
+                speed_curvature(1.0, 0.0, variation, phase1, frequency) if varied else 0.0,
+            )  # fmt: skip
+            end = add_unbalance(rules, f0, g0, h0, f1, g1, h1, end, shape)
+        read_outputs(outputs, end, seen, shape)
+        r1, s1 = seen[TOOL_X] - seen[WORKPIECE_X], seen[TOOL_V] - seen[WORKPIECE_V]
+        b1, v1 = seen[BEARING_X], seen[BEARING_V]
+        chip = r1 - u1
+        happens = False
+        if sides > 0.0:
+            if touch == layout.FREE:
+                happens |= may_turn_back(clearance - b0, -v0, clearance - b1, -v1, 1.0)
+                if sides == 2.0:
+                    happens |= may_turn_back(clearance + b0, v0, clearance + b1, v1, 1.0)
+            elif touch == layout.ABOVE:
+                happens |= may_turn_back(b0 - clearance, v0, b1 - clearance, v1, 1.0)
+            else:
+                happens |= may_turn_back(-b0 - clearance, -v0, -b1 - clearance, -v1, 1.0)
+        if leaves:
+            if in_cut:
+                happens |= may_turn_back(r0 - u0, s0 - d0, chip, s1 - d1, 1.0)
+            else:
+                happens |= may_turn_back(u0 - r0, d0 - s0, -chip, d1 - s1, 1.0)
+        if happens or not (abs(seen[TOOL_X]) <= limit and abs(seen[WORKPIECE_X]) <= limit):
             break
 
         head += 1
+        bend = seen[BEND] + direct[layout.SURFACE] * u1
+        if unbalanced:
+            bend += direct[layout.UNBALANCE_FORCE] * f1
         if in_cut:
-            bend = relative_acceleration(matrix, xt1, vt1, xw1, vw1, u1, 0.0)
-            surface.write_node(
-                nodes, head, new_angle, new_fed + xt1 - xw1,
-                (feed_speed + vt1 - vw1) * per_speed, bend * per_square, rise,
-            )  # fmt: skip
+            forced = bend
+            if noisy:
+                forced += (
+                    direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
+                )
+            left_slope, left_bend = s1, forced
+            if varied:
+                left_slope, left_bend = by_place(s1, forced, lead, speed1, acceleration1)
+            surface.write_node(nodes, head, place1, r1 + ahead1, left_slope, left_bend, rise)
         else:
-            surface.write_node(
-                nodes, head, new_angle, next_met, next_slope, next_curvature,
-                min(rise, nodes[pointer + 1, surface.PITCH]),
-            )  # fmt: skip
-        xt, vt, xw, vw = xt1, vt1, xw1, vw1
-        u0, du0, ddu0 = u1, du1, ddu1
-        angle, angle_low, fed, fed_low = new_angle, new_angle_low, new_fed, new_fed_low
-        met, met_slope, met_curvature = next_met, next_slope, next_curvature
-        pointer = node
-        pieces += 1
+            finest = min(rise, nodes[pointer + 1, surface.PITCH])
+            surface.write_node(nodes, head, place1, height1 - feed, slope1, curvature1, finest)
+            nodes[head, surface.CURVATURE_AFTER] = after
+        now = end
+        height, slope, curvature = height1, slope1, after
+        u0, d0, e0 = u1, d1, e1
+        if varied:
+            d0, e0 = by_time(slope, after, lead, speed1, acceleration1)
+        else:
+            e0 = after
+        f0, g0, h0 = f1, g1, h1
+        r0, s0, b0, v0 = r1, s1, b1, v1
+        place, ahead, pointer = place1, ahead1, node
+        speed, acceleration, phase = speed1, acceleration1, phase1
         index += 1
         if index == steps:
             index = 0
             samples += 1
+            force = 0.0
+            if in_cut:
+                force = stiffness * chip + damping * s1 + between
             write_sample(
-                out, row, samples / rate, turns + angle, xt, vt, xw, vw,
-                max(chip, 0.0) if may_leave else chip + nominal, stiffness * chip,
+                out, row, samples / rate, origin + (origin_low + place * turns), seen, per_step,
+                max(chip, 0.0) if leaves else chip, force,
             )  # fmt: skip
+            if runout:
+                add_runout(out, row, settings, target * speed)
+            if accelerations:
+                for i in range(n2):
+                    z[i] = now[i]
+                write_accelerations(out, row, z, rules, direct, u1, on_tool, between, f1)
             row += 1
 
-    numbers[layout.TOOL_X], numbers[layout.TOOL_V] = xt, vt
-    numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V] = xw, vw
-    numbers[layout.ANGLE], numbers[layout.ANGLE_LOW] = angle, angle_low
-    numbers[layout.FED], numbers[layout.FED_LOW] = fed, fed_low
-    numbers[layout.MET], numbers[layout.MET_SLOPE] = met, met_slope
-    numbers[layout.MET_CURVATURE] = met_curvature
+    for i in range(n2):
+        z[i] = now[i]
+    numbers[layout.PLACE], numbers[layout.PHASE], numbers[layout.AHEAD] = place, phase, ahead
+    numbers[layout.HEIGHT], numbers[layout.SLOPE] = height, slope
+    numbers[layout.CURVATURE] = curvature
     counts[layout.POINTER], counts[layout.HEAD] = pointer, head
-    counts[layout.SAMPLES], counts[layout.PIECES] = samples, pieces
-    counts[layout.STEP] = index
+    counts[layout.SAMPLES], counts[layout.STEP] = samples, index
+    numbers[layout.RELATIVE], numbers[layout.RELATIVE_RATE] = r0, s0
+    numbers[layout.AT_BEARING], numbers[layout.AT_BEARING_RATE] = b0, v0
     return row

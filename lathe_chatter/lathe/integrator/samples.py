@@ -8,49 +8,63 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import noise
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.propagation import IN_CUT
+
+COLUMNS = 8
+"""Without accelerations, of which there are two more."""
 
 
 @compiled(inline=True, borrows=True)
 def write_sample(
-    out: Array, row: int, time: float, angle: float, xt: float, vt: float, xw: float, vw: float,
-    chip: float, force: float,
+    out: Array, row: int, time: float, angle: float, present: Array, per_step: float, chip: float,
+    force: float,
 ) -> None:  # fmt: skip
-    """Write a sample, columns as in `model.SAMPLE_COLUMNS`."""
+    """Write a sample, columns as in `samples.SAMPLE_COLUMNS`."""
     out[row, 0], out[row, 1] = time, angle
-    out[row, 2], out[row, 3], out[row, 4], out[row, 5] = xt, vt, xw, vw
+    out[row, 2], out[row, 3] = present[layout.TOOL_X], present[layout.TOOL_V] * per_step
+    out[row, 4], out[row, 5] = present[layout.WORKPIECE_X], present[layout.WORKPIECE_V] * per_step
     out[row, 6], out[row, 7] = chip, force
 
 
 @compiled(borrows=True)
-def add_measurement(out: Array, row: int, settings: Array, speed: float, seed: int) -> None:
-    """Add to a sample what sensors see beside the motion: runout and their own noise."""
-    turn = 2.0 * math.pi * (out[row, 1] % 1.0)
-    out[row, 4] += settings[layout.RUNOUT] * math.cos(turn)
-    out[row, 5] -= settings[layout.RUNOUT] * 2.0 * math.pi * speed * math.sin(turn)
-    if settings[layout.SENSOR_NOISE] > 0.0:
-        sample = round(out[row, 0] * settings[layout.SAMPLE_RATE])
-        out[row, 2] += settings[layout.SENSOR_NOISE] * noise.standard_normal(
-            seed, noise.TOOL_SENSOR_STREAM, sample
-        )
-        out[row, 4] += settings[layout.SENSOR_NOISE] * noise.standard_normal(
-            seed, noise.WORKPIECE_SENSOR_STREAM, sample
-        )
+def add_runout(out: Array, row: int, settings: Array, speed: float) -> None:
+    """Add to a sample what the sensors see of bodies that are not round; speed in rev/s."""
+    turn = 2.0 * math.pi * (out[row, 1] - math.floor(out[row, 1]))
+    cosine, swing = math.cos(turn), 2.0 * math.pi * speed * math.sin(turn)
+    out[row, 2] += settings[layout.TOOL_RUNOUT] * cosine
+    out[row, 3] -= settings[layout.TOOL_RUNOUT] * swing
+    out[row, 4] += settings[layout.RUNOUT] * cosine
+    out[row, 5] -= settings[layout.RUNOUT] * swing
 
 
 @compiled(borrows=True)
-def write_present(numbers: Array, counts: Integers, settings: Array, out: Array, row: int) -> None:
-    """Count and write the sample of the present state."""
-    counts[layout.SAMPLES] += 1
-    xt, xw = numbers[layout.TOOL_X], numbers[layout.WORKPIECE_X]
-    chip = xt - xw - (numbers[layout.MET] - numbers[layout.FED])
-    in_cut = counts[layout.REGIME] & IN_CUT != 0
-    thickness = chip + settings[layout.NOMINAL_FEED_SPEED] / numbers[layout.SPEED]
-    if settings[layout.MAY_LEAVE_CUT] != 0.0:
-        thickness = max(chip, 0.0)
-    write_sample(
-        out, row, counts[layout.SAMPLES] / settings[layout.SAMPLE_RATE],
-        counts[layout.TURNS] + numbers[layout.ANGLE],
-        xt, numbers[layout.TOOL_V], xw, numbers[layout.WORKPIECE_V],
-        thickness, settings[layout.CUTTING_STIFFNESS] * chip if in_cut else 0.0,
-    )  # fmt: skip
+def write_accelerations(
+    out: Array, row: int, z: Array, rules: Array, direct: Array, met: float, on_tool: float,
+    between: float, turning: float,
+) -> None:  # fmt: skip
+    """Write both accelerations, m/s2, under the forces that act on the way to this sample."""
+    for k in range(2):
+        total = direct[4 * k + 4] * met + direct[4 * k + 5] * on_tool
+        total += direct[4 * k + 6] * between + direct[4 * k + 7] * turning
+        for i in range(z.shape[0]):
+            total += rules[layout.TOOL_ACCELERATION + k, i] * z[i]
+        out[row, COLUMNS + k] = total
+
+
+@compiled(borrows=True)
+def add_sensor_noise(out: Array, rows: int, counts: Integers, settings: Array) -> None:
+    """Add to the samples of a call the noise of their sensors."""
+    first, seed = counts[layout.SAMPLES] - rows + 1, int(settings[layout.SEED])
+    size = settings[layout.SENSOR_NOISE]
+    if size > 0.0:
+        tool = noise.stream_key(seed, noise.TOOL_SENSOR_STREAM)
+        workpiece = noise.stream_key(seed, noise.WORKPIECE_SENSOR_STREAM)
+        for row in range(rows):
+            out[row, 2] += size * noise.normal(tool, first + row)
+            out[row, 4] += size * noise.normal(workpiece, first + row)
+    size = settings[layout.ACCELERATION_NOISE]
+    if size > 0.0 and out.shape[1] > COLUMNS:
+        tool = noise.stream_key(seed, noise.TOOL_ACCELEROMETER_STREAM)
+        workpiece = noise.stream_key(seed, noise.WORKPIECE_ACCELEROMETER_STREAM)
+        for row in range(rows):
+            out[row, COLUMNS] += size * noise.normal(tool, first + row)
+            out[row, COLUMNS + 1] += size * noise.normal(workpiece, first + row)

@@ -2,8 +2,9 @@
 
     Omega(t) = n(t) (1 + A sin(2 pi psi)),   n' = slope,   psi' = variation frequency
 
-All in revolutions and seconds. The turned angle is its closed integral, without cancellation
-for slow variation, so the regenerative delay is exact: phi(t) - phi(t - tau) = 1 rev.
+In any units of angle and time; the inner loop has steps for both. The turned angle is its closed
+integral, without cancellation for slow variation, so the regenerative delay is exact:
+phi(t) - phi(t - tau) = 1 rev.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ _NEWTON_STEPS = 20
 def speed_and_slope(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> tuple[float, float]:
-    """Omega and dOmega/dt at phase `phase` (cycles) of the variation, rev/s and rev/s2."""
+    """Omega and dOmega/dt at phase `phase` (cycles) of the variation."""
     turn = 2.0 * math.pi * phase
     factor = 1.0 + amplitude * math.sin(turn)
     swing = amplitude * 2.0 * math.pi * frequency * math.cos(turn)
@@ -30,7 +31,7 @@ def speed_and_slope(
 def turned(
     time: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
-    """Revolutions made in `time`.
+    """The angle turned in `time`.
 
     The variation is integrated about the middle of the interval: with z = omega time / 2,
     integral of sin = 2 sin(middle) sin(z) / omega, and the ramp adds
@@ -60,7 +61,7 @@ def turned(
 def time_to_turn(
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
-    """Time in which the spindle turns `angle` (rev), by Newton: `turned` is increasing."""
+    """Time in which the spindle turns `angle`, by Newton: `turned` is increasing."""
     start, _ = speed_and_slope(base, slope, amplitude, phase, frequency)
     time = angle / start
     for _ in range(_NEWTON_STEPS):
@@ -72,3 +73,12 @@ def time_to_turn(
         if abs(miss) <= 1e-16 + 4e-16 * angle:
             break
     return time
+
+
+@compiled(borrows=True)
+def speed_curvature(
+    base: float, slope: float, amplitude: float, phase: float, frequency: float
+) -> float:
+    """The second derivative of Omega by time at phase `phase` (cycles) of the variation."""
+    turn, rate = 2.0 * math.pi * phase, 2.0 * math.pi * frequency
+    return amplitude * rate * (2.0 * slope * math.cos(turn) - base * rate * math.sin(turn))

@@ -1,10 +1,10 @@
 """The compiled inner loop: exact propagation between located events.
 
-Time advances in whole steps of the sample grid. Quiet ones, nearly all, are taken by the fast
-loop of quiet.py; the others are cut at whatever happens inside them (pieces.py).
+Time advances in whole steps of the sample grid. Plain ones, nearly all, are taken by the fast
+loop of plain_steps.py; the others are cut at whatever happens inside them (event_step.py).
 
 The loop has no memory of its own: everything that a lathe remembers is in the arrays of
-layout.py, so any partition of a run into calls gives the same bits.
+state_layout.py, so any partition of a run into calls gives the same bits.
 """
 
 from __future__ import annotations
@@ -15,70 +15,129 @@ import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import noise
+from lathe_chatter.lathe.integrator import noise, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.event_step import take_step
-from lathe_chatter.lathe.integrator.plain_steps import take_quiet_steps
-from lathe_chatter.lathe.integrator.plan import PIECE_SIZE, Scratch
-from lathe_chatter.lathe.integrator.propagation import TERMS
-from lathe_chatter.lathe.integrator.samples import add_measurement, write_present
+from lathe_chatter.lathe.integrator.event_step import Machine, Scratch, take_step
+from lathe_chatter.lathe.integrator.piece import PIECE_SIZE
+from lathe_chatter.lathe.integrator.plain_steps import take_plain_steps
+from lathe_chatter.lathe.integrator.propagation import TERMS, Shape
+from lathe_chatter.lathe.integrator.samples import (
+    COLUMNS,
+    add_runout,
+    add_sensor_noise,
+    write_accelerations,
+    write_sample,
+)
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope
+from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
+
+_NONE = np.zeros(1, dtype=np.int64)
 
 
-@compiled()
-def new_scratch() -> Scratch:
-    """Room for the pieces of a step."""
-    return Scratch(
-        np.empty(PIECE_SIZE), np.empty(4), np.empty(TERMS), np.empty(TERMS), np.empty(6),
-        np.empty(TERMS),
-    )  # fmt: skip
+def room_for(modes: int) -> Array:
+    """Room for a call of `advance`."""
+    width = 2 * modes
+    return surface.aligned(
+        8 * _LINE + _whole_lines(width) + (TERMS + 5) * _whole_lines(width + TERMS)
+    )
+
+
+_LINE = 16
+"""Numbers in two lines of the processor's cache: room for each of the small arrays."""
 
 
 @compiled(inline=True, borrows=True)
-def is_measured(settings: Array) -> bool:
-    """Whether sensors see something beside the motion."""
-    return bool(settings[layout.RUNOUT] > 0.0 or settings[layout.SENSOR_NOISE] > 0.0)
+def _whole_lines(count: int) -> int:
+    """So many numbers and more, to the end of a line of the processor's cache."""
+    return (count + 7) // 8 * 8
 
 
 @compiled(borrows=True)
-def take_any_step(
-    numbers: Array, counts: Integers, nodes: Array, settings: Array, mechanics: Array,
-    matrices: Array, seed: int, out: Array, row: int, events: Array, found: int,
-    scratch: Scratch,
+def _move_origin(numbers: Array, counts: Integers, nodes: Array, settings: Array) -> None:
+    """Count places from a later origin, before they become large or where they left the grid."""
+    place, shift = numbers[layout.PLACE], 0.0
+    steady = settings[layout.VARIATION] == 0.0
+    steady = steady and numbers[layout.SPEED] == settings[layout.TARGET_SPEED]
+    if steady and place != math.floor(place):
+        shift = place
+    if place >= settings[layout.SPAN] and shift == 0.0:
+        shift = settings[layout.SPAN]
+    if shift == 0.0:
+        return
+    pointer, head = counts[layout.POINTER], counts[layout.HEAD]
+    surface.forget(nodes, pointer, head, shift)
+    counts[layout.POINTER], counts[layout.HEAD] = 0, head - pointer
+    numbers[layout.PLACE] = place - shift
+    turned = shift / settings[layout.TURN] + numbers[layout.ORIGIN_LOW]
+    total = numbers[layout.ORIGIN] + turned
+    numbers[layout.ORIGIN_LOW] = turned - (total - numbers[layout.ORIGIN])
+    numbers[layout.ORIGIN] = total
+
+
+@compiled(inline=True, borrows=True)
+def _take_any_step(
+    numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
+    out: Array, row: int, events: Array, found: int, scratch: Scratch, shape: Shape,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Take a step whatever happens in it, and write sample `row` if it ends one.
-
-    Arrays as in `advance`.
 
     Returns:
         Samples written (0 or 1), events written so far, and a status as `advance` has it.
     """
-    force = 0.0
-    if settings[layout.FORCE_NOISE] > 0.0:
-        # Held for a sample: the mean of white noise of this density over that time.
-        force = settings[layout.FORCE_NOISE] * math.sqrt(settings[layout.SAMPLE_RATE])
-        force *= noise.standard_normal(seed, noise.FORCE_STREAM, counts[layout.SAMPLES])
-        if counts[layout.STEP] == 0 and numbers[layout.LEFT] == 0.0:
-            counts[layout.CORNER] = min(counts[layout.CORNER] or 2, 2)
+    on_tool, between = settings[layout.FORCE_NOISE], settings[layout.CUTTING_FORCE_NOISE]
+    seed = int(settings[layout.SEED])
+    if on_tool != 0.0:
+        key = noise.stream_key(seed, noise.FORCE_STREAM)
+        on_tool *= noise.normal(key, counts[layout.SAMPLES])
+    if between != 0.0:
+        key = noise.stream_key(seed, noise.CUTTING_FORCE_STREAM)
+        between *= noise.normal(key, counts[layout.SAMPLES])
     found, status = take_step(
-        numbers, counts, nodes, settings, mechanics, matrices, force, events, found, scratch
-    )
+        numbers, z, counts, nodes, settings, machine, on_tool, between, events, found, scratch,
+        shape,
+    )  # fmt: skip
     if status != layout.FINISHED:
         return 0, found, status
     counts[layout.STEP] += 1
     if counts[layout.STEP] < counts[layout.STEPS]:
         return 0, found, layout.FINISHED
     counts[layout.STEP] = 0
-    xt, xw = numbers[layout.TOOL_X], numbers[layout.WORKPIECE_X]
-    if not (abs(xt) <= settings[layout.LIMIT] and abs(xw) <= settings[layout.LIMIT]):
+    seen, limit = scratch.seen, settings[layout.LIMIT]
+    if not (abs(seen[layout.TOOL_X]) <= limit and abs(seen[layout.WORKPIECE_X]) <= limit):
         return 0, found, layout.GUARD
-    write_present(numbers, counts, settings, out, row)
-    if is_measured(settings):
-        speed, _ = speed_and_slope(
-            numbers[layout.SPEED], 0.0, settings[layout.VARIATION],
-            numbers[layout.PHASE], settings[layout.VARIATION_FREQUENCY],
+    counts[layout.SAMPLES] += 1
+    met = numbers[layout.HEIGHT] - settings[layout.FEED] - numbers[layout.AHEAD]
+    chip, force, regime = numbers[layout.RELATIVE] - met, 0.0, counts[layout.REGIME]
+    base, slope = numbers[layout.SPEED] / settings[layout.TARGET_SPEED], 0.0
+    if base != 1.0:
+        slope = math.copysign(settings[layout.ACCELERATION], 1.0 - base)
+    speed, acceleration = base, 0.0
+    if slope != 0.0 or settings[layout.VARIATION] != 0.0:
+        speed, acceleration = speed_and_slope(
+            base, slope, settings[layout.VARIATION], numbers[layout.PHASE],
+            settings[layout.VARIATION_FREQUENCY],
         )  # fmt: skip
-        add_measurement(out, row, settings, speed, seed)
+    more = 0.0
+    if regime & layout.IN_CUT != 0:
+        damping, rate = settings[layout.PROCESS_DAMPING], numbers[layout.RELATIVE_RATE]
+        more = damping * (1.0 / speed - 1.0) * rate
+        force = settings[layout.CUTTING_STIFFNESS] * chip + damping * rate + more + between
+    write_sample(
+        out, row, counts[layout.SAMPLES] / settings[layout.SAMPLE_RATE],
+        angle_at(numbers, settings, numbers[layout.PLACE]), seen,
+        1.0 / settings[layout.STEP_LENGTH],
+        max(chip, 0.0) if settings[layout.MAY_LEAVE_CUT] != 0.0 else chip, force,
+    )  # fmt: skip
+    if settings[layout.RUNOUT] != 0.0 or settings[layout.TOOL_RUNOUT] != 0.0:
+        add_runout(out, row, settings, settings[layout.TARGET_SPEED] * speed)
+    if out.shape[1] > COLUMNS:
+        turning = 0.0
+        if settings[layout.UNBALANCE] != 0.0:
+            turning, _, _ = unbalance_force(settings, out[row, 1], speed, acceleration, 0.0)
+        write_accelerations(
+            out, row, z, machine.rules[regime], machine.direct[regime], met, on_tool,
+            between - more, turning,
+        )  # fmt: skip
     return 1, found, layout.FINISHED
 
 
@@ -87,47 +146,78 @@ def advance(
     numbers: Array,
     counts: Integers,
     nodes: Array,
-    settings: Array,
-    mechanics: Array,
-    matrices: Array,
-    seed: int,
+    flat: Array,
     out: Array,
     events: Array,
+    room: Array,
+    shape: Shape,
 ) -> tuple[int, int, int]:
     """Cut on for `out.shape[0]` samples.
 
     Args:
-        numbers: The remembered numbers (layout.NUMBERS_SIZE,), changed in place.
+        numbers: The remembered numbers (layout.NUMBERS_SIZE,), after them the coordinates (2n,)
+            and the motion that they were made from (2n,), changed in place.
         counts: The remembered integers (layout.COUNTS_SIZE,), changed in place.
         nodes: The surface (capacity, surface.NODE_SIZE), changed in place.
-        settings: The cut (layout.SETTINGS_SIZE,).
-        mechanics: The constants of machine and cut (propagation.MECHANICS_SIZE,).
-        matrices: The response to a whole step, from `propagation.step_matrices`.
-        seed: Of the noise.
-        out: Written: the samples (n, 8).
+        flat: Settings and coefficients, from `coefficients.constants_of`.
+        out: Written: the samples (n, 8), or (n, 10) with accelerations.
         events: Written: samples before the event, s since that sample, kind (m, 3).
+        room: From `room_for`.
+        shape: One entry for each of the n modes.
 
     Returns:
         Samples written, events written, and FINISHED, GUARD, or what must be made larger
         before the rest is asked for: SURFACE_FULL or EVENTS_FULL.
     """
-    scratch = new_scratch()
-    row = found = 0
-    while True:
-        first = row
-        row = take_quiet_steps(numbers, counts, nodes, settings, mechanics, matrices, out, row)
-        if is_measured(settings):
-            for done in range(first, row):
-                add_measurement(out, done, settings, numbers[layout.SPEED], seed)
+    n2, regimes = 2 * len(shape), layout.REGIMES
+    z = numbers[layout.NUMBERS_SIZE : layout.NUMBERS_SIZE + n2]
+    settings = flat[: layout.SETTINGS_SIZE]
+    first = layout.SETTINGS_SIZE
+    last = first + regimes * layout.ROWS * n2
+    rules = flat[first:last].reshape((regimes, layout.ROWS, n2))
+    first, last = last, last + regimes * (n2 + 1) * layout.OUTPUTS
+    outputs = flat[first:last].reshape((regimes, n2 + 1, layout.OUTPUTS))
+    first, last = last, last + regimes * layout.DIRECT
+    direct = flat[first:last].reshape((regimes, layout.DIRECT))
+    first, last = last, last + regimes * regimes * (n2 + 1) * n2
+    moves = flat[first:last].reshape((regimes, regimes, n2 + 1, n2))
+    matrices = flat[last:].reshape((regimes, 2, n2, n2))
+    machine = Machine(rules, outputs, direct, moves, matrices)
+    width = _whole_lines(n2 + TERMS)
+    series = 8 * _LINE + _whole_lines(n2)
+    work = series + TERMS * width
+    scratch = Scratch(
+        room[:PIECE_SIZE], room[8 * _LINE : 8 * _LINE + n2],
+        room[_LINE : _LINE + layout.OUTPUTS],
+        room[series : series + TERMS * n2].reshape((TERMS, n2)),
+        room[work : work + 5 * (n2 + TERMS)].reshape((5, n2 + TERMS)),
+        room[2 * _LINE : 2 * _LINE + 6], room[3 * _LINE : 3 * _LINE + 6],
+        room[4 * _LINE : 4 * _LINE + 6], room[5 * _LINE : 5 * _LINE + TERMS],
+    )  # fmt: skip
+    # No literals: each would have the loops compiled once more.
+    row, found, status = int(_NONE[0]), int(_NONE[0]), int(_NONE[0])
+    if out.shape[0] > 0:
+        counts[layout.MADE] = 0
+    while status == layout.FINISHED:
+        if numbers[layout.LEFT] == 0.0:
+            _move_origin(numbers, counts, nodes, settings)
+        regime = counts[layout.REGIME]
+        row = take_plain_steps(
+            numbers, z, counts, nodes, settings, rules[regime], outputs[regime], direct[regime],
+            matrices[regime, 1], out, row, scratch.seen, shape,
+        )  # fmt: skip
         if row == out.shape[0]:
-            return row, found, layout.FINISHED
+            break
         # Which loop takes a step must not depend on the room there is, or bits would.
         if counts[layout.HEAD] + 2 >= nodes.shape[0]:
-            return row, found, layout.SURFACE_FULL
-        wrote, found, status = take_any_step(
-            numbers, counts, nodes, settings, mechanics, matrices, seed, out, row, events, found,
-            scratch,
-        )  # fmt: skip
+            status = layout.SURFACE_FULL
+            break
+        if numbers[layout.LEFT] == 0.0 and numbers[layout.PLACE] >= settings[layout.SPAN]:
+            continue
+        wrote, found, status = _take_any_step(
+            numbers, z, counts, nodes, settings, machine, out, row, events, found, scratch, shape
+        )
         row += wrote
-        if status != layout.FINISHED:
-            return row, found, status
+    if settings[layout.SENSOR_NOISE] > 0.0 or settings[layout.ACCELERATION_NOISE] > 0.0:
+        add_sensor_noise(out, row, counts, settings)
+    return row, found, status

@@ -1,9 +1,10 @@
 """What the last revolution left on the workpiece, kept against spindle angle.
 
-The surface is a chain of quintics over spindle angle. Each node carries the surface S with its
-first two derivatives by angle on either side, because a knock, a retune or an event leaves a
-corner; S is measured from where the feed stood when the current turn began. Positions are in
-revolutions of the current turn: the surface that the tool meets at angle phi stands at phi - 1.
+The surface is a chain of quintics over spindle angle, counted in steps at the target speed: the
+surface that the tool meets at place phi stands at phi - N, N steps a turn. Each node carries the
+surface S with its first two derivatives by place on either side, because a knock, a retune, an
+event or a force that is held for a sample leaves a corner. S is measured from where a steady feed
+would stand, so at a steady speed it is r.
 
 A node also says of which derivative it carries a jump (`ORDER`). One turn later a jump in
 derivative q of the surface is a jump in derivative q + 2 of the motion, since it enters through
@@ -21,14 +22,14 @@ from lathe_chatter.compiled import compiled
 
 # One node is one cache line of 8 numbers, see `empty_nodes`.
 (
-    ANGLE,  # rev, of the current turn; the turn before is negative
+    PLACE,  # steps at the target speed, from the origin
     HEIGHT,  # S, m
-    SLOPE_BEFORE,  # dS/dphi on the side of smaller angle, m/rev
-    CURVATURE_BEFORE,  # d2S/dphi2 there, m/rev2
+    SLOPE_BEFORE,  # dS/dphi on the side of smaller angle, m/step
+    CURVATURE_BEFORE,  # d2S/dphi2 there, m/step2
     SLOPE_AFTER,
     CURVATURE_AFTER,
     ORDER,  # lowest derivative of S that jumps here, or SMOOTH
-    PITCH,  # rev per whole step when the surface was cut: how finely it is described
+    PITCH,  # turned in a whole step when the surface was cut: how finely it is described
 ) = range(8)
 NODE_SIZE = 8
 _CACHE_LINE = 64
@@ -53,6 +54,13 @@ def aligned(*shape: int) -> Array:
     return room[first : first + size].reshape(shape)
 
 
+def aligned_copy(values: Array) -> Array:
+    """The same numbers (n,), beginning where a line of the processor's cache does."""
+    result = aligned(len(values))
+    result[:] = values
+    return result
+
+
 def with_room(nodes: Array, capacity: int) -> Array:
     """The same nodes (..., n, NODE_SIZE) with room for `capacity` of them."""
     result = empty_nodes(*nodes.shape[:-2], capacity)
@@ -60,12 +68,11 @@ def with_room(nodes: Array, capacity: int) -> Array:
     return result
 
 
-def fresh_surface(slope: float, capacity: int) -> Array:
-    """A smooth surface before the first turn: S = slope * phi for phi <= 0 (capacity, 8)."""
+def fresh_surface(offset: float, turn: float, capacity: int) -> Array:
+    """A smooth surface before the first turn of `turn` steps: S = offset (capacity, 8)."""
     nodes = empty_nodes(capacity)
-    nodes[:2, ANGLE] = -1.0, 0.0
-    nodes[:2, HEIGHT] = -slope, 0.0
-    nodes[:2, SLOPE_BEFORE] = nodes[:2, SLOPE_AFTER] = slope
+    nodes[:2, PLACE] = -turn, 0.0
+    nodes[:2, HEIGHT] = offset
     nodes[:2, ORDER] = SMOOTH
     nodes[:2, PITCH] = math.inf
     return nodes
@@ -73,13 +80,13 @@ def fresh_surface(slope: float, capacity: int) -> Array:
 
 @compiled(inline=True, borrows=True)
 def quintic_at(
-    angle0: float, height0: float, slope0: float, curvature0: float,
-    angle1: float, height1: float, slope1: float, curvature1: float, angle: float,
+    place0: float, height0: float, slope0: float, curvature0: float,
+    place1: float, height1: float, slope1: float, curvature1: float, at: float,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """S, dS/dphi and d2S/dphi2 at `angle` on the quintic with these values at two angles."""
-    width = angle1 - angle0
+    """S and its first two derivatives at place `at` on the quintic with these values at two."""
+    width = place1 - place0
     per_width = 1.0 / width
-    place = (angle - angle0) * per_width
+    place = (at - place0) * per_width
     d0 = slope0 * width
     e0 = curvature0 * width * width
     rise = height1 - height0 - d0 - 0.5 * e0
@@ -95,24 +102,24 @@ def quintic_at(
 
 
 @compiled(inline=True, borrows=True)
-def surface_at(nodes: Array, left: int, angle: float) -> tuple[float, float, float]:
-    """S, dS/dphi and d2S/dphi2 at `angle` between nodes `left` and `left + 1`."""
+def surface_at(nodes: Array, left: int, at: float) -> tuple[float, float, float]:
+    """S and its first two derivatives at place `at` between nodes `left` and `left + 1`."""
     right = left + 1
     return quintic_at(
-        nodes[left, ANGLE], nodes[left, HEIGHT],
+        nodes[left, PLACE], nodes[left, HEIGHT],
         nodes[left, SLOPE_AFTER], nodes[left, CURVATURE_AFTER],
-        nodes[right, ANGLE], nodes[right, HEIGHT],
-        nodes[right, SLOPE_BEFORE], nodes[right, CURVATURE_BEFORE], angle,
+        nodes[right, PLACE], nodes[right, HEIGHT],
+        nodes[right, SLOPE_BEFORE], nodes[right, CURVATURE_BEFORE], at,
     )  # fmt: skip
 
 
 @compiled(inline=True, borrows=True)
 def write_node(
-    nodes: Array, node: int, angle: float, height: float, slope: float, curvature: float,
+    nodes: Array, node: int, place: float, height: float, slope: float, curvature: float,
     pitch: float,
 ) -> None:  # fmt: skip
     """Write a node that is smooth until it turns out to be a corner."""
-    nodes[node, ANGLE] = angle
+    nodes[node, PLACE] = place
     nodes[node, HEIGHT] = height
     nodes[node, SLOPE_BEFORE] = nodes[node, SLOPE_AFTER] = slope
     nodes[node, CURVATURE_BEFORE] = nodes[node, CURVATURE_AFTER] = curvature
@@ -121,14 +128,38 @@ def write_node(
 
 
 @compiled(borrows=True)
-def next_turn(nodes: Array, first: int, last: int, advance: float) -> None:
-    """Forget what lies before node `first`, and count angle and feed from the new turn on.
+def forget(nodes: Array, first: int, last: int, shift: float) -> None:
+    """Forget what lies before node `first`, and count places from an origin `shift` further on.
 
-    Rebasing once a turn keeps angles below 2 rev and heights near one feed, so that an hour
-    of cutting is as exact as its first second, and the memory is that of one turn.
+    Small numbers have small rounding, so an hour of cutting is as exact as its first second; and
+    the memory is that of a few turns.
     """
     for node in range(first, last + 1):
         for entry in range(NODE_SIZE):
             nodes[node - first, entry] = nodes[node, entry]
-        nodes[node - first, ANGLE] -= 1.0
-        nodes[node - first, HEIGHT] -= advance
+        nodes[node - first, PLACE] -= shift
+
+
+def recounted(nodes: Array, start: float, ratio: float, ahead: float, feeds: Array) -> Array:
+    """Nodes (n, NODE_SIZE) of a surface for another count of steps and another steady feed.
+
+    Args:
+        nodes: As they are.
+        start: The place that becomes the origin.
+        ratio: New steps a turn over the old ones.
+        ahead: By how much the feed is ahead of the old steady one, m.
+        feeds: The old steady feed and the new one (2,), each in its own m/step.
+    """
+    result = nodes.copy()
+    old, new = feeds[0], feeds[1]
+    place = nodes[:, PLACE] - start
+    result[:, PLACE] = place * ratio
+    result[:, HEIGHT] = nodes[:, HEIGHT] - ahead + (old * place - new * (place * ratio))
+    for slope, curvature in (
+        (SLOPE_BEFORE, CURVATURE_BEFORE),
+        (SLOPE_AFTER, CURVATURE_AFTER),
+    ):
+        result[:, slope] = (nodes[:, slope] + old) / ratio - new
+        result[:, curvature] = nodes[:, curvature] / (ratio * ratio)
+    result[:, PITCH] = nodes[:, PITCH] * ratio
+    return result

@@ -1,7 +1,8 @@
 """Corners: where a derivative of the surface that is being cut jumps.
 
-A knock, a retune, an event, or a corner that the tool meets leaves one at the newest node. What
-follows it is known only when the cut goes on, with whatever it goes on with.
+A knock, a retune, an event, a corner that the tool meets, or a force that is held for a sample
+leaves one at the newest node. What follows it is known only when the cut goes on, with whatever it
+goes on with.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
-from lathe_chatter.lathe.integrator.propagation import IN_CUT, relative_acceleration
 
 
 @compiled(inline=True, borrows=True)
@@ -20,22 +20,51 @@ def lower(order: int, other: int) -> int:
 
 
 @compiled(inline=True, borrows=True)
+def by_place(
+    rate: float, bend: float, lead: float, speed: float, acceleration: float
+) -> tuple[float, float]:
+    """Slope and curvature of the surface by place, from r' and r'' by time.
+
+    Args:
+        rate: r', m/step.
+        bend: r'', m/step2.
+        lead: m/step that the feed gains on a spindle that stands still.
+        speed: Of the spindle over its target.
+        acceleration: The derivative of that per step.
+    """
+    slope = (rate + lead * (1.0 - speed)) / speed
+    return slope, (bend - (lead + slope) * acceleration) / (speed * speed)
+
+
+@compiled(borrows=True)
+def bend_of(
+    z: Array, outputs: Array, direct: Array, met: float, on_tool: float, between: float,
+    turning: float,
+) -> float:  # fmt: skip
+    """r'', m/step2, of coordinates that meet the surface at `met` under forces, N."""
+    bend: float = 0.0
+    for i in range(z.shape[0]):
+        bend += outputs[i, layout.BEND] * z[i]
+    bend += direct[layout.SURFACE] * met
+    bend += direct[layout.UNBALANCE_FORCE] * turning
+    bend += direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
+    return bend
+
+
+@compiled(borrows=True)
 def finish_corner(
-    numbers: Array, counts: Integers, nodes: Array, settings: Array, matrices: Array,
-    force: float, speed: float, acceleration: float,
+    numbers: Array, counts: Integers, nodes: Array, settings: Array, bend: float,
+    speed: float, acceleration: float,
 ) -> None:  # fmt: skip
     """Write what follows the newest node, a corner: it differs from what led to it."""
-    head, regime = counts[layout.HEAD], counts[layout.REGIME]
-    slope, curvature = numbers[layout.MET_SLOPE], numbers[layout.MET_CURVATURE]
+    head = counts[layout.HEAD]
+    slope, curvature = numbers[layout.SLOPE], numbers[layout.CURVATURE]
     order = counts[layout.SURFACE_CORNER]
-    if regime & IN_CUT != 0:
+    if counts[layout.REGIME] & layout.IN_CUT != 0:
         order = lower(order, counts[layout.CORNER])
-        xt, vt = numbers[layout.TOOL_X], numbers[layout.TOOL_V]
-        xw, vw = numbers[layout.WORKPIECE_X], numbers[layout.WORKPIECE_V]
-        met = numbers[layout.MET] - numbers[layout.FED]
-        bend = relative_acceleration(matrices[regime], xt, vt, xw, vw, met, force)
-        slope = (settings[layout.FEED_SPEED] + vt - vw) * (1.0 / speed)
-        curvature = (bend - slope * acceleration) * (1.0 / (speed * speed))
+        slope, curvature = by_place(
+            numbers[layout.RELATIVE_RATE], bend, settings[layout.LEAD], speed, acceleration
+        )
     nodes[head, surface.SLOPE_AFTER] = slope
     nodes[head, surface.CURVATURE_AFTER] = curvature
     if order > 0:

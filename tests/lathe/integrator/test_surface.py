@@ -16,7 +16,7 @@ def _nodes(angles: list[float]) -> Array:
     nodes = np.zeros((len(angles) + 3, surface.NODE_SIZE))
     slope, curvature = _QUINTIC.deriv(), _QUINTIC.deriv(2)
     for k, angle in enumerate(angles):
-        nodes[k, surface.ANGLE] = angle
+        nodes[k, surface.PLACE] = angle
         nodes[k, surface.HEIGHT] = _QUINTIC(angle)
         nodes[k, [surface.SLOPE_BEFORE, surface.SLOPE_AFTER]] = slope(angle)
         nodes[k, [surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER]] = curvature(angle)
@@ -48,7 +48,7 @@ def test_the_error_of_the_hold_falls_with_the_sixth_power_of_the_step() -> None:
     for width in (0.2, 0.1):
         nodes = np.zeros((2, surface.NODE_SIZE))
         for k, angle in enumerate((0.5, 0.5 + width)):
-            nodes[k, surface.ANGLE], nodes[k, surface.HEIGHT] = angle, np.sin(7.0 * angle)
+            nodes[k, surface.PLACE], nodes[k, surface.HEIGHT] = angle, np.sin(7.0 * angle)
             nodes[k, [surface.SLOPE_BEFORE, surface.SLOPE_AFTER]] = 7.0 * np.cos(7.0 * angle)
             nodes[k, [surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER]] = -49.0 * np.sin(
                 7.0 * angle
@@ -59,24 +59,35 @@ def test_the_error_of_the_hold_falls_with_the_sixth_power_of_the_step() -> None:
     assert errors[0] > 2.0**5.5 * errors[1]
 
 
-def test_before_the_first_turn_the_surface_is_a_ramp() -> None:
-    nodes = surface.fresh_surface(50e-6, 16)
+def test_before_the_first_turn_the_surface_is_smooth() -> None:
+    nodes = surface.fresh_surface(3e-6, 200.0, 16)
     assert nodes.shape == (16, surface.NODE_SIZE)
-    for angle in (-1.0, -0.3, 0.0):
-        height, slope, curvature = surface.surface_at(nodes, 0, angle)
-        assert height == pytest.approx(50e-6 * angle, abs=1e-20)
-        assert slope == pytest.approx(50e-6)
-        assert curvature == pytest.approx(0.0, abs=1e-18)
+    for place in (-200.0, -60.3, 0.0):
+        height, slope, curvature = surface.surface_at(nodes, 0, place)
+        assert height == pytest.approx(3e-6, rel=1e-14)
+        assert (slope, curvature) == (0.0, 0.0)
 
 
-def test_a_new_turn_moves_the_origin_and_nothing_else() -> None:
+def test_a_later_origin_moves_places_and_nothing_else() -> None:
     nodes = _nodes([-0.2, 0.1, 0.4, 0.9])
     before = [surface.surface_at(nodes, left, 0.05 + 0.3 * left) for left in (1, 2)]
-    surface.next_turn(nodes, 1, 3, 0.25)
+    surface.forget(nodes, 1, 3, 1.0)
     after = [surface.surface_at(nodes, left - 1, 0.05 + 0.3 * left - 1.0) for left in (1, 2)]
     for old, new in zip(before, after, strict=True):
-        assert new[0] + 0.25 == pytest.approx(old[0], rel=1e-12)
-        assert new[1:] == pytest.approx(old[1:], rel=1e-9)
+        assert new == pytest.approx(old, rel=1e-9)
+
+
+def test_a_surface_counted_otherwise_is_the_same_surface() -> None:
+    """Of a steady feed of its own, the height over a common origin is one at every angle."""
+    nodes, start, ahead = _nodes([-0.2, 0.1, 0.4]), 0.3, 0.05
+    old, new, ratio = 0.7, 0.2, 2.5
+    other = surface.recounted(nodes[:3], start, ratio, ahead, np.array([old, new]))
+    for place in (0.15, 0.2, 0.39):
+        height, slope, _ = surface.surface_at(nodes, 1, place)
+        again, slope_again, _ = surface.surface_at(other, 1, (place - start) * ratio)
+        absolute = height + old * (place - start) - ahead
+        assert again + new * (place - start) * ratio == pytest.approx(absolute, rel=1e-12)
+        assert (slope_again + new) * ratio == pytest.approx(slope + old, rel=1e-12)
 
 
 def test_room_for_more_nodes_keeps_every_bit() -> None:

@@ -33,8 +33,8 @@ _MERGE = 1e-13
 class _Step(NamedTuple):
     start: float
     length: float
-    end_state: Array  # (4,)
-    polynomials: Array  # ascending powers of (t - start) / length, (8, 4)
+    end_state: Array  # (2n,)
+    polynomials: Array  # ascending powers of (t - start) / length, (8, 2n)
 
 
 def solve(
@@ -46,7 +46,10 @@ def solve(
     tool_leaves_cut: bool = True,
     step: float = 2.5e-4,
 ) -> Solution:
-    """Integrate from `model.paper_initial_state`, with r = 0 before.
+    """Integrate from `model.paper_initial_state`, with r = r(0) before.
+
+    Displacement and velocity of n modes alternate, those of the tool first. A body is displaced
+    as by a force at rest, and has its velocity from a blow.
 
     Args:
         machine: The machine.
@@ -63,9 +66,9 @@ def solve(
     for part in run.steps(times[-1]):
         upto = int(np.searchsorted(times, part.start + part.length + 1e-15, side='right'))
         x = (times[taken:upto] - part.start) / part.length
-        states[taken:upto] = np.vander(x, 8, increasing=True) @ part.polynomials
+        states[taken:upto] = np.vander(x, 8, increasing=True) @ part.polynomials @ run.seen
         taken = upto
-    states[taken:] = run.state
+    states[taken:] = run.state @ run.seen
     return Solution(states, tuple(run.events))
 
 
@@ -73,27 +76,50 @@ class _Run:
     """The state and everything that the past has left behind."""
 
     def __init__(self, machine: Machine, cut: Cut, step: float, *, tool_leaves_cut: bool) -> None:
-        tool, workpiece = machine.tool, machine.workpiece
-        self.tool = (tool.stiffness / tool.mass, tool.damping / tool.mass, 1.0 / tool.mass)
-        self.workpiece = (
-            workpiece.stiffness / workpiece.mass,
-            workpiece.damping / workpiece.mass,
-            1.0 / workpiece.mass,
-        )
-        self.bearing = machine.bearing_stiffness / workpiece.mass
+        modes = (*machine.tool.modes, *machine.workpiece.modes)
+        signs = [1.0] * len(machine.tool.modes) + [-1.0] * len(machine.workpiece.modes)
+        self.modes = [
+            (
+                mode.stiffness / mode.mass,
+                mode.damping / mode.mass,
+                sign * mode.force / mode.mass,
+                (sign < 0.0) * mode.bearing * machine.bearing_stiffness / mode.mass,
+            )
+            for sign, mode in zip(signs, modes, strict=True)
+        ]  # fmt: skip
+        self.across = [sign * mode.chip for sign, mode in zip(signs, modes, strict=True)]
+        self.at_bearing = [
+            (sign < 0.0) * mode.bearing for sign, mode in zip(signs, modes, strict=True)
+        ]
+        self.seen = np.zeros((2 * len(modes), 4))
+        start = paper_initial_state(cut)
+        self.state = np.zeros(2 * len(modes))
+        for body, sign in ((0, 1.0), (2, -1.0)):
+            own = [k for k in range(len(modes)) if signs[k] == sign]
+            soft = sum(modes[k].chip ** 2 / modes[k].stiffness for k in own)
+            light = sum(modes[k].chip ** 2 / modes[k].mass for k in own)
+            for k in own:
+                self.seen[2 * k, body] = self.seen[2 * k + 1, body + 1] = modes[k].chip
+                self.state[2 * k] = start[body] * modes[k].chip / modes[k].stiffness / soft
+                self.state[2 * k + 1] = start[body + 1] * modes[k].chip / modes[k].mass / light
         self.cutting_stiffness = machine.cutting_stiffness(cut.depth_of_cut)
+        surface_speed = np.pi * cut.workpiece_diameter * cut.spindle_speed_rpm / 60.0
+        self.process_damping = cut.process_damping * cut.depth_of_cut / surface_speed
         self.delay, self.clearance = cut.delay, cut.bearing_clearance
         self.feed = cut.feed if tool_leaves_cut else 0.0
         self.longest = self.delay / np.ceil(self.delay / step)
-        self.state = paper_initial_state(cut)
+        self.offset = float(self.state[0::2] @ self.across)
         self.watched = []
-        if cut.bearing_contact is BearingContact.GAP:
+        if cut.bearing_contact in {BearingContact.GAP, BearingContact.BOTH_SIDES}:
             self.watched.append('bearing')
+        if cut.bearing_contact is BearingContact.BOTH_SIDES:
+            self.watched.append('below')
         if tool_leaves_cut:
             self.watched.append('chip')
         self.engaged = {
             'bearing': cut.bearing_contact is BearingContact.SEATED
-            or ('bearing' in self.watched and self.state[2] >= self.clearance),
+            or ('bearing' in self.watched and self._bearing(self.state) >= self.clearance),
+            'below': 'below' in self.watched and self._bearing(self.state) <= -self.clearance,
             'chip': True,
         }
         self.events: list[Event] = []
@@ -107,26 +133,33 @@ class _Run:
         t -= self.delay
         i = bisect_right(self.starts, t) - 1
         if i < 0:
-            return 0.0
+            return self.offset
         x = (t - self.starts[i]) / self.lengths[i]
         result = 0.0
         for c in self.surfaces[i]:  # highest power first
             result = result * x + c
         return result
 
+    def _bearing(self, state: Array) -> float:
+        return float(state[0::2] @ self.at_bearing)
+
     def derivative(self, t: float, state: Array) -> list[float]:
-        """Equations (8a) and (8b)."""
-        x, v, y, w = state.tolist()
-        force = 0.0
+        """Equations (8a) and (8b), of every mode."""
+        values = state.tolist()
+        force = push = 0.0
         if self.engaged['chip']:
-            force = self.cutting_stiffness * (self.feed + x - y - self.surface_before(t))
-        k, c, compliance = self.tool
-        tool = -k * x - c * v - compliance * force
-        k, c, compliance = self.workpiece
-        workpiece = -k * y - c * w + compliance * force
-        if self.engaged['bearing']:
-            workpiece -= self.bearing * (y - self.clearance)
-        return [v, tool, w, workpiece]
+            r = sum(c * x for c, x in zip(self.across, values[0::2], strict=True))
+            rate = sum(c * v for c, v in zip(self.across, values[1::2], strict=True))
+            force = self.cutting_stiffness * (self.feed + r - self.surface_before(t))
+            force += self.process_damping * rate
+        if self.engaged['bearing'] or self.engaged['below']:
+            side = self.clearance if self.engaged['bearing'] else -self.clearance
+            push = sum(c * x for c, x in zip(self.at_bearing, values[0::2], strict=True)) - side
+        result = []
+        for k, (stiffness, damping, on_force, on_bearing) in enumerate(self.modes):
+            x, v = values[2 * k], values[2 * k + 1]
+            result += [v, -stiffness * x - damping * v - on_force * force - on_bearing * push]
+        return result
 
     def steps(self, end: float) -> Iterator[_Step]:
         """Every step up to `end`, from break to break and from event to event."""
@@ -171,7 +204,7 @@ class _Run:
         order = met + 2 if cutting else met
         if event == 'chip':
             order = min(order, 1)
-        elif event == 'bearing' and cutting:
+        elif event and cutting:
             order = min(order, 3)
         if order <= _ORDER:
             heapq.heappush(self.breaks, (t + self.delay, order))
@@ -199,7 +232,7 @@ class _Run:
     def _remember(self, step: _Step) -> None:
         self.state = step.end_state
         if self.engaged['chip']:
-            left = step.polynomials[:, 0] - step.polynomials[:, 2]
+            left = step.polynomials[:, 0::2] @ self.across
         else:
             left = self._surface_polynomial(step)
             left[0] -= self.feed
@@ -215,11 +248,12 @@ class _Run:
         """Time and kind of the first event within a step; the kind is empty without one."""
         found = []
         for kind in self.watched:
-            if kind == 'bearing':
-                signal = step.polynomials[:, 2].copy()
+            if kind != 'chip':
+                signal = step.polynomials[:, 0::2] @ self.at_bearing
+                signal = signal if kind == 'bearing' else -signal
                 signal[0] -= self.clearance
             else:
-                signal = step.polynomials[:, 0] - step.polynomials[:, 2]
+                signal = step.polynomials[:, 0::2] @ self.across
                 signal = signal - self._surface_polynomial(step)
                 signal[0] += self.feed
             if passed and self.passed == kind:
