@@ -279,7 +279,7 @@ class LatheState:
         place, ahead = numbers[layout.PLACE], numbers[layout.AHEAD]
         used = self.nodes[: int(counts[layout.HEAD]) + 1]
         self.nodes[: len(used)] = surface.recounted(used, place, ratio, ahead, feeds)
-        met = np.zeros((1, surface.NODE_SIZE))
+        met: Array = np.zeros((1, surface.NODE_SIZE))
         met[0, surface.PLACE] = place - old[layout.TURN]
         met[0, surface.HEIGHT] = numbers[layout.HEIGHT]
         met[0, surface.SLOPE_AFTER] = numbers[layout.SLOPE]

@@ -249,7 +249,7 @@ def _fill_rules(
     everyone = np.arange(2 * n)
     square = settings[layout.STEP_LENGTH] ** 2
     in_cut = float(regime & layout.IN_CUT)
-    inputs = np.zeros((2 * n, 4))
+    inputs: Array = np.zeros((2 * n, 4))
     inputs[n:, layout.SURFACE] = in_cut * settings[layout.CUTTING_STIFFNESS] * shapes.apart
     inputs[n:, layout.TOOL_FORCE] = shapes.on_tool
     inputs[n:, layout.CUTTING_FORCE] = -in_cut * shapes.apart
