@@ -34,7 +34,7 @@ ARROWS = {
     'knocks': {'model', 'lathe', 'stability'},
     'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
-    'scenario': {'model', 'samples', 'lathe', 'detection', 'recording'},
+    'scenario': {'model', 'lathe', 'detection', 'recording'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'nodes': {
