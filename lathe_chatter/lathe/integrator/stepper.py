@@ -17,7 +17,8 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import noise, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.event_step import Machine, Scratch, take_step
+from lathe_chatter.lathe.integrator.event_search import Machine, Scratch
+from lathe_chatter.lathe.integrator.event_step import take_step
 from lathe_chatter.lathe.integrator.piece import PIECE_SIZE
 from lathe_chatter.lathe.integrator.plain_steps import take_plain_steps
 from lathe_chatter.lathe.integrator.propagation import TERMS, Shape
