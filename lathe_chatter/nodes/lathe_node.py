@@ -40,8 +40,7 @@ from lathe_chatter.precompile import LATHE_LOOP, precompile
 _BUDGET = 5_000_000
 """ns of ticks, or of waiting for readers, after which requests have their turn."""
 _READERS_PATIENCE = 100_000_000
-"""ns that a node which cuts as fast as it can waits at most for its slowest reader; in real time
-it waits for nobody."""
+"""ns that a node as fast as possible waits for its slowest reader; in real time for nobody."""
 _MAX_KNOCKS = 1000
 """Knocks between two ticks; they come one after the other, and are applied together."""
 _LOOK_FOR_READERS = 5_000_000
