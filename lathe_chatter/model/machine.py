@@ -171,7 +171,7 @@ class Machine:
             allowed = f'at most {MOST_MODES}, of tool and workpiece together'
             raise ParameterError('the number of modes', count, '', allowed)
         if self.bearing_stiffness is None:
-            object.__setattr__(self, 'bearing_stiffness', 0.5 * self.workpiece.stiffness)
+            object.__setattr__(self, 'bearing_stiffness', 0.5 * abs(self.workpiece.stiffness))
         check_fields(self)
 
     def cutting_stiffness(self, depth_of_cut: float) -> float:

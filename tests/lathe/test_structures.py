@@ -73,7 +73,7 @@ _CASES: dict[str, tuple[Machine, dict[str, Any]]] = {
     '2+2': (_machine(2), {}),
     '2+2, any speed': (_machine(2), {'spindle_speed_rpm': 2999.7, 'bearing_clearance': 2e-6}),
     '4+4': (_machine(4), {}),
-    '8+8': (_machine(8), {}),
+    '8+8': (_machine(8), {'depth_of_cut': 3e-3}),
     'apart': (_apart(), {}),
     'process damping': (_machine(2), {'process_damping': 3e3}),
     'both sides': (Machine(), {'bearing_contact': 'both_sides', 'bearing_clearance': 3e-6}),
@@ -127,7 +127,7 @@ def _random(rng: np.random.Generator) -> Machine:
             for _ in range(rng.integers(1, 3))
         ]  # fmt: skip
 
-    return Machine(body(), body())
+    return Machine(body(), body(), bearing_stiffness=1e4)
 
 
 def _characteristic(machine: Machine, cut: Cut, s: complex) -> complex:
