@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from types import FrameType, TracebackType
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def exit_on_end_signals() -> None:
+    """From now on each of them ends the process with exit code 0; one that is ignored does not.
+
+    For the time in which there is nothing to finish yet. An exception would not do: raised amid
+    the import of a library it can come out as another error, and with a traceback.
+    """
+    for number in END_SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, lambda _number, _frame: os._exit(0))
 
 
 def raise_on_end_signals() -> list[int]:

@@ -1,9 +1,16 @@
-"""The executables of the nodes: where there is no ROS 2, they say so in a sentence."""
+"""The executables of the nodes, which hear a signal from their first moment on.
+
+    python -m lathe_chatter.nodes.entry_points lathe|chatter_monitor|run_recorder|cell
+
+Where there is no ROS 2, they say so in a sentence.
+"""
 
 from __future__ import annotations
 
 import sys
 from importlib import import_module
+
+from lathe_chatter.nodes.deferred_signals import exit_on_end_signals
 
 
 def lathe() -> None:
@@ -35,9 +42,16 @@ def no_ros(error: ImportError) -> str:
 
 
 def _run(module: str) -> None:
+    exit_on_end_signals()  # until the node, whose imports take a second, hears them itself
     try:
         node = import_module(f'lathe_chatter.nodes.{module}')
     except ImportError as error:
         sys.stderr.write(f'{no_ros(error)}\n')
         raise SystemExit(2) from None
     node.main()
+
+
+if __name__ == '__main__':
+    {each.__name__: each for each in (lathe, chatter_monitor, run_recorder, cell)}[
+        sys.argv.pop(1)
+    ]()

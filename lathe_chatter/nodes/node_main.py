@@ -107,10 +107,11 @@ def run_node(
         SystemExit: With 0 after `--help`; with 2 and a sentence on stderr if the node cannot
             start as it was asked to.
     """
-    came = raise_on_end_signals()
+    came: list[int] = []
     node: _Node | None = None
     begun = False
     try:
+        came = raise_on_end_signals()
         _refuse_words(sys.argv if args is None else ['', *args], usage)
         if logs := ensure_log_folder():
             sys.stderr.write(f'{logs}\n')

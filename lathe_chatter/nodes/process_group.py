@@ -16,7 +16,8 @@ from lathe_chatter.errors import NodeFailedError
 _END_TIMEOUT = 15.0
 """s that a node has to finish what it does after SIGTERM."""
 _ENDED_WELL = (0, -signal.SIGTERM)
-"""The latter of a node that was told to end while it was still being imported."""
+"""The latter of a node that was told to end while Python itself was still starting."""
+_NODES = 'lathe_chatter.nodes.entry_points'
 _SET_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
@@ -43,9 +44,9 @@ class ProcessGroup:
         """Begin empty."""
         self._members: list[_Member] = []
 
-    def start(self, name: str, module: str, arguments: Sequence[str] = ()) -> None:
-        """Start a node as `python -m module` with ROS arguments."""
-        command = [sys.executable, '-m', module]
+    def start(self, name: str, arguments: Sequence[str] = (), *, module: str = _NODES) -> None:
+        """Start a node as `python -m module name` with ROS arguments."""
+        command = [sys.executable, '-m', module, name]
         if arguments:
             command += ['--ros-args', *arguments]
         output = tempfile.TemporaryFile()  # noqa: SIM115 -- lives as long as the process
@@ -91,7 +92,7 @@ class ProcessGroup:
                     f'{name} did not end within {_END_TIMEOUT:.0f} s and was killed.'
                 )
             else:
-                if process.returncode not in _ENDED_WELL and not _interrupted(output):
+                if process.returncode not in _ENDED_WELL:
                     complaints.append(_last_words(name, process.returncode, output))
             output.close()
         return complaints
@@ -110,20 +111,11 @@ class ProcessGroup:
         self.end()
 
 
-def _interrupted(output: IO[bytes]) -> bool:
-    """Whether a node was told to end while a library was being imported that exits with 1 then."""
-    return _last_line(output) == KeyboardInterrupt.__name__
-
-
-def _last_line(output: IO[bytes]) -> str:
-    output.seek(0)
-    lines = output.read().decode(errors='replace').split('\n')
-    return next((line.strip() for line in reversed(lines) if line.strip()), '')
-
-
 def _last_words(name: str, code: int, output: IO[bytes]) -> str:
     """What a node said last, as the reason for its end, unless it was killed."""
     if code < 0:
         return f'{name} was ended by the signal {signal.Signals(-code).name}.'
-    words = _last_line(output) or 'it said nothing'
+    output.seek(0)
+    lines = output.read().decode(errors='replace').split('\n')
+    words = next((line.strip() for line in reversed(lines) if line.strip()), 'it said nothing')
     return f'{name} ended with exit code {code}: {words}'

@@ -131,7 +131,6 @@ def _play(
                 _look_around(operator, spin)
                 cell.start(
                     'run_recorder',
-                    'lathe_chatter.nodes.recorder_node',
                     parameter_arguments(
                         {'output': str(output), 'attachments': [str(file.resolve())]}
                     ),
@@ -139,14 +138,12 @@ def _play(
                 given = operator.scenario.parameters
                 cell.start(
                     'chatter_monitor',
-                    'lathe_chatter.nodes.monitor_node',
                     # The machine alone: of the cut it knows what the samples tell.
                     parameter_arguments({name: given[name] for name in given if name in MONITOR}),
                 )
                 _await_nodes(operator, spin)
             cell.start(
                 'lathe',
-                'lathe_chatter.nodes.lathe_node',
                 parameter_arguments({'await_readers': _READERS, **operator.scenario.parameters}),
             )
             operator.playing = True

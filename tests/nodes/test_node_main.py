@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import random
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import pytest
 from std_msgs.msg import Float64MultiArray, String
 from support.node_bench import LATCHED, Bench
+from support.node_processes import NODES
 
 from lathe_chatter.nodes.parameters import MONITOR as TABLE
 from lathe_chatter.precompile import precompile
@@ -113,3 +117,41 @@ def test_a_signal_ends_every_node_with_exit_0(
         _, err = process.communicate(timeout=60)
         assert process.returncode == 0
         assert 'Traceback' not in err
+
+
+def hears(process: subprocess.Popen[str]) -> bool:
+    """Whether a process has a handler of SIGTERM, which Python alone has not."""
+    caught = Path(f'/proc/{process.pid}/status').read_text().partition('SigCgt:')[2].split()[0]
+    return bool(int(caught, 16) >> signal.SIGTERM - 1 & 1)
+
+
+@pytest.mark.usefixtures('domain')
+@pytest.mark.skipif(sys.platform != 'linux', reason='/proc tells which signals are heard')
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('node', ['lathe', 'chatter_monitor', 'run_recorder', 'cell'])
+def test_a_signal_while_it_starts_ends_a_node_without_a_word(
+    node: str,
+    number: signal.Signals,
+    tmp_path: Path,
+    processes: list[subprocess.Popen[str]],
+) -> None:
+    """At three instants of the first second, most of which goes into imports."""
+    precompile()
+    for _ in range(3):
+        process = subprocess.Popen(
+            [*NODES, node],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        while not hears(process):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.001)
+        time.sleep(random.random())
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 0, err
+        assert 'Traceback' not in err
+        assert 'KeyboardInterrupt' not in err

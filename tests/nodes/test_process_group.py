@@ -47,7 +47,7 @@ def test_a_node_that_fails_is_named_with_its_last_words(
     program: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with ProcessGroup() as group:
-        group.start('node', module(tmp_path, monkeypatch, program))
+        group.start('node', module=module(tmp_path, monkeypatch, program))
         assert failure(group) == said
 
 
@@ -56,7 +56,7 @@ def test_a_node_that_is_killed_is_named_with_the_signal(
 ) -> None:
     program = f'import os; os.kill(os.getpid(), {int(signal.SIGKILL)})'
     with ProcessGroup() as group:
-        group.start('node', module(tmp_path, monkeypatch, program))
+        group.start('node', module=module(tmp_path, monkeypatch, program))
         assert failure(group) == 'node was ended by the signal SIGKILL.'
 
 
@@ -66,11 +66,11 @@ def test_a_node_that_does_not_end_is_killed_and_named(
     monkeypatch.setattr(process_group, '_END_TIMEOUT', 1.0)
     ready = tmp_path / 'ready'
     program = (
-        'import pathlib, signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); '
+        'import pathlib, signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); '
         f'pathlib.Path({os.fspath(ready)!r}).touch(); time.sleep(600)'
     )
     with ProcessGroup() as group:
-        group.start('node', module(tmp_path, monkeypatch, program))
+        group.start('node', module=module(tmp_path, monkeypatch, program))
         while not ready.exists():
             group.check()
             time.sleep(0.01)

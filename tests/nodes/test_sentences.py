@@ -197,7 +197,7 @@ SAID = {
             f'{GROUP}::test_a_node_that_fails_is_named_with_its_last_words',
         ),
         '{} did not end within {} s and was killed.': (
-            'it was asked with SIGINT so long ago',
+            'it was asked with SIGTERM so long ago',
             f'{GROUP}::test_a_node_that_does_not_end_is_killed_and_named',
         ),
     },

@@ -20,12 +20,7 @@ import lathe_chatter
 from lathe_chatter.samples.codec import SampleDecoder
 from support.node_bench import LATCHED, Bench
 
-MODULES = {
-    'lathe': 'lathe_chatter.nodes.lathe_node',
-    'chatter_monitor': 'lathe_chatter.nodes.monitor_node',
-    'run_recorder': 'lathe_chatter.nodes.recorder_node',
-    'cell': 'lathe_chatter.nodes.cell',
-}
+NODES = [sys.executable, '-m', 'lathe_chatter.nodes.entry_points']
 _PACKAGE = Path(lathe_chatter.__file__).parents[1]
 _PLENTY = 50_000
 """Blocks that may wait for a test which the machine holds up: 100 s of a lathe."""
@@ -49,7 +44,7 @@ class NodeProcesses:
         """Start a node with parameters as for `-p`."""
         words = [word for parameter in parameters for word in ('-p', parameter)]
         words += ['-r', f'__ns:={namespace}'] if namespace else []
-        command = [sys.executable, '-m', MODULES[node], '--ros-args', *words]
+        command = [*NODES, node, '--ros-args', *words]
         return self.start_program(f'{namespace}/{node}', command)
 
     def start_program(self, name: str, command: Sequence[str]) -> subprocess.Popen[bytes]:
