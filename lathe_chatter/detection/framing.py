@@ -202,7 +202,7 @@ class Framer:
         return found
 
 
-@compiled(inner=True)
+@compiled()
 def _blind(rows: Array) -> int:
     """How many rows (n, 5) there are before one with a displacement."""
     for i in range(rows.shape[0]):

@@ -273,6 +273,10 @@ def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
     return Advice(tuple(AdvisedSpeed(speed, probability=_RULE_HOLDS) for speed in inside))
 
 
+_ANOTHER_SPEED = 0.01
+"""Part by which a speed differs from the one at which speeds were recommended, if it is another."""
+
+
 class Identified(NamedTuple):
     """What is known of a cut that chatters.
 
@@ -315,6 +319,7 @@ class SpeedAdviser:
         """Nothing chatters yet."""
         self.machine = machine
         self._speed_range = speed_range
+        self._advised_at = math.nan
         self.forget()
 
     def forget(self) -> None:
@@ -340,6 +345,10 @@ class SpeedAdviser:
         growth, error = known.growth_rate, known.growth_error
         if growth < -error or error > _VAGUE:
             return  # it dies down, or nobody knows
+        tried = abs(known.spindle_speed_rpm / self._advised_at - 1.0) > _ANOTHER_SPEED
+        if tried and growth < error:
+            return  # what was recommended may yet be the cure
+        self._advised_at = known.spindle_speed_rpm
         if self.machine is None or not modelled:
             self.advice = rule_of_thumb(known.frequency, self._speed_range)
             return
