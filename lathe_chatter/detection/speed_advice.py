@@ -274,7 +274,7 @@ def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
 
 
 _ANOTHER_SPEED = 0.01
-"""Part by which a speed differs from the one at which speeds were recommended, if it is another."""
+"""Part by which a speed must differ from the one that was advised for to be another."""
 
 
 class Identified(NamedTuple):
