@@ -19,7 +19,7 @@ from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
-from lathe_chatter.stability import rightmost_root
+from lathe_chatter.stability import rightmost_root, safe_limit
 
 LATHE_LOOP, DETECTOR_LOOP = 'lathe', 'detector'
 _CUT = Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.SEATED)
@@ -85,12 +85,13 @@ def _cut() -> None:
 
 
 def _detect() -> None:
-    """Watch a machine at rest, and load what advice about a speed takes."""
+    """Watch a machine at rest, and load what advice about a speed and a picture take."""
     samples = np.zeros((2000, len(SAMPLE_COLUMNS)))
     samples[:, 0] = np.arange(2000) / _SAMPLE_RATE
     samples[:, 1] = samples[:, 0] * _CUT.spindle_speed_rpm / 60.0
     ChatterDetector().update(samples, SAMPLE_COLUMNS)
     rightmost_root(Machine(), _CUT.spindle_speed_rpm, _CUT.depth_of_cut, seated=True)
+    safe_limit(Machine(), _CUT, _CUT.spindle_speed_rpm)
 
 
 _PARTS = {LATHE_LOOP: _cut, DETECTOR_LOOP: _detect}

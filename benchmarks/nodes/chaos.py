@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from ear import Ear, ear
-from processes import LATHE, MONITOR, RECORDER, script
+from processes import LATHE, MONITOR, NODES, RECORDER, script
 from rosgraph_msgs.msg import Clock
 
 from lathe_chatter.nodes.messages import time_message
@@ -45,7 +45,7 @@ class Nodes:
 
     def start(self, name: str) -> None:
         """Start one that does not run."""
-        module, values = {'lathe': LATHE, 'monitor': MONITOR, 'recorder': RECORDER}[name], []
+        node, values = {'lathe': LATHE, 'monitor': MONITOR, 'recorder': RECORDER}[name], []
         if name == 'recorder':
             self._runs += 1
             values.append(f'output:={self.run}')
@@ -57,7 +57,7 @@ class Nodes:
         words = [word for value in values for word in ('-p', value)]
         with (self.folder / f'{name}.log').open('ab') as log:
             self.running[name] = subprocess.Popen(  # noqa: S603 -- our own modules
-                [sys.executable, '-m', module, '--ros-args', *words],
+                [*NODES, node, '--ros-args', *words],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
             )  # fmt: skip
 

@@ -18,17 +18,15 @@ import rclpy
 
 from lathe_chatter.nodes.node_main import make_executor
 
-LATHE = 'lathe_chatter.nodes.lathe_node'
-MONITOR = 'lathe_chatter.nodes.monitor_node'
-RECORDER = 'lathe_chatter.nodes.recorder_node'
-CELL = 'lathe_chatter.nodes.cell'
+NODES = [sys.executable, '-m', 'lathe_chatter.nodes.entry_points']
+LATHE, MONITOR, RECORDER, CELL = 'lathe', 'chatter_monitor', 'run_recorder', 'cell'
 
 
 @contextlib.contextmanager
-def running(module: str, *arguments: str, cores: set[int] | None = None) -> Iterator[int]:
+def running(node: str, *arguments: str, cores: set[int] | None = None) -> Iterator[int]:
     """A node as a process; its process id."""
     process = subprocess.Popen(  # noqa: S603 -- our own modules
-        [sys.executable, '-m', module, *(['--ros-args', *arguments] if arguments else [])],
+        [*NODES, node, *(['--ros-args', *arguments] if arguments else [])],
         stderr=subprocess.DEVNULL,
         preexec_fn=(lambda: os.sched_setaffinity(0, cores)) if cores else None,  # noqa: PLW1509 -- no thread is running
     )
