@@ -93,3 +93,27 @@ def test_what_is_compiled_is_said_nothing_of() -> None:
     said: list[str] = []
     precompile(say=said.append)
     assert not said
+
+
+def test_a_run_and_its_picture_compile_nothing_that_was_not_compiled_before(
+    tmp_path: Path,
+) -> None:
+    """Whether from a cache or not: what `precompile` has not called is called here first."""
+    program = f"""
+import gc
+from numba.core.registry import CPUDispatcher
+from lathe_chatter.cli.main import main
+from lathe_chatter.precompile import precompile
+
+def entered():
+    found = [each for each in gc.get_objects() if isinstance(each, CPUDispatcher)]
+    return {{(each.__name__, str(kind)) for each in found for kind in each.overloads}}
+
+precompile()
+before = entered()
+assert main(['simulate', '--scenario', 'clearance', '--output', {str(tmp_path / 'run')!r}]) == 0
+assert main(['report', {str(tmp_path / 'run')!r}]) == 0
+assert before and entered() == before, entered() - before
+"""
+    done = run(program)
+    assert done.returncode == 0, done.stderr
