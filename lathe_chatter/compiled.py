@@ -74,6 +74,7 @@ def _numba_set(**options: Any) -> Iterator[None]:
 def compiled(
     *,
     inline: bool = False,
+    merged: bool = False,
     borrows: bool = False,
     apart: bool = False,
     nogil: bool = False,
@@ -89,6 +90,7 @@ def compiled(
 
     Args:
         inline: Whether callers take the code into theirs, for what is called in every step.
+        merged: The same before types are known, for what returns an array that it has changed.
         borrows: Whether it makes no array and only looks at those of its caller, so that the
             references to them need not be counted: atomic operations, dearer than a step.
         apart: Whether no two of its arrays overlap, so that more can be done at once.
@@ -104,7 +106,9 @@ def compiled(
         return flags
 
     def decorate(function: Function) -> Function:
-        options = {'error_model': 'numpy', 'nogil': nogil}
+        options: dict[str, Any] = {'error_model': 'numpy', 'nogil': nogil}
+        if merged:
+            options['inline'] = 'always'
         if borrows:
             options['_nrt'] = False  # as Numba's own helpers do
         result: Any = numba.njit(forceinline=inline, **options)(function)

@@ -45,6 +45,7 @@ class Scratch(NamedTuple):
     turning: Array  # that of the force of an unbalance (6,)
     forces: Array  # (6,)
     margin: Array  # of an event (TERMS,)
+    room: Array  # for coordinates (2, 2n)
 
 
 @compiled(inline=True, borrows=True)

@@ -29,10 +29,10 @@ from lathe_chatter.lathe.integrator.propagation import (
     add_held_forces,
     add_unbalance,
     coordinates_at,
-    in_registers,
     read_outputs,
     whole_step,
 )
+from lathe_chatter.lathe.integrator.registers import loaded
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.state_layout import (
     BEARING_V,
@@ -207,10 +207,11 @@ def take_step(
                 solve_series(z, regime, machine, scratch, (f0, g0, h0, f1, g1, h1), shape)
             else:
                 there = whole_step(
-                    in_registers(z, shape), rules, machine.matrices[regime, 1],
+                    loaded(z, scratch.room[0], shape), rules, machine.matrices[regime, 1],
                     direct[layout.COUPLED] != 0.0, in_cut,
                     piece[at.MET_0], piece[at.RATE_0], piece[at.BEND_0],
-                    piece[at.MET_1], piece[at.RATE_1], piece[at.BEND_1], shape,
+                    piece[at.MET_1], piece[at.RATE_1], piece[at.BEND_1],
+                    loaded(z, scratch.room[1], shape), shape,
                 )  # fmt: skip
                 if noisy:
                     there = add_held_forces(rules, on_tool, between, there, shape)

@@ -22,10 +22,10 @@ from lathe_chatter.lathe.integrator.propagation import (
     Shape,
     add_held_forces,
     add_unbalance,
-    in_registers,
     read_outputs,
     whole_step,
 )
+from lathe_chatter.lathe.integrator.registers import loaded, moved_to
 from lathe_chatter.lathe.integrator.samples import (
     COLUMNS,
     add_runout,
@@ -50,7 +50,7 @@ from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 def take_plain_steps(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, rules: Array,
     outputs: Array, direct: Array, step_matrix: Array, out: Array, row: int,
-    seen: Array, shape: Shape,
+    seen: Array, room: Array, shape: Shape,
 ) -> int:  # fmt: skip
     """Take plain steps, beginning with sample `row`.
 
@@ -67,6 +67,7 @@ def take_plain_steps(
         out: As in `stepper.advance`.
         row: The sample that is next.
         seen: Room (OUTPUTS,).
+        room: Room for coordinates (2, 2n).
         shape: One entry a mode.
 
     Returns:
@@ -147,7 +148,7 @@ def take_plain_steps(
         forced = direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
         finish_corner(numbers, counts, nodes, settings, bend + forced, speed, acceleration)
 
-    now = in_registers(z, shape)
+    now, end = loaded(z, room[0], shape), loaded(z, room[1], shape)
     while row < out.shape[0] and head + 2 < nodes.shape[0] and place < span:
         if noisy and index == 0:
             on_tool = tool_noise * noise.normal(tool_key, samples)
@@ -226,7 +227,9 @@ def take_plain_steps(
         u1, d1, e1 = height1 - feed - ahead1, slope1, curvature1
         if varied:
             d1, e1 = by_time(slope1, curvature1, lead, speed1, acceleration1)
-        end = whole_step(now, rules, step_matrix, coupled, in_cut, u0, d0, e0, u1, d1, e1, shape)
+        end = whole_step(
+            now, rules, step_matrix, coupled, in_cut, u0, d0, e0, u1, d1, e1, end, shape
+        )
         if noisy:
             end = add_held_forces(rules, on_tool, between, end, shape)
         if unbalanced:
@@ -275,7 +278,7 @@ def take_plain_steps(
             finest = min(rise, nodes[pointer + 1, surface.PITCH])
             surface.write_node(nodes, head, place1, height1 - feed, slope1, curvature1, finest)
             nodes[head, surface.CURVATURE_AFTER] = after
-        now = end
+        now = moved_to(now, end, shape)
         height, slope, curvature = height1, slope1, after
         u0, d0, e0 = u1, d1, e1
         if varied:

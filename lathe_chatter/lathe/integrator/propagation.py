@@ -17,11 +17,13 @@ Whole steps repeat with the same length, so for them the series is summed once p
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numba.cpython.unsafe.tuple import tuple_setitem
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
+from lathe_chatter.lathe.integrator.registers import with_entry
 from lathe_chatter.lathe.integrator.state_layout import (
     BY_CUTTING_FORCE,
     BY_SURFACE,
@@ -149,34 +151,25 @@ def coordinates_at(series: Array, place: float, z: Array, shape: Shape) -> None:
             z[i] = z[i] * place + series[k, i]
 
 
-@compiled(inline=True, borrows=True)
-def in_registers(z: Array, shape: Shape) -> Shape:
-    """The coordinates (2n,) as a tuple: it goes from step to step without a way through memory."""
-    result = shape + shape
-    for i in range(2 * len(shape)):
-        result = tuple_setitem(result, i, z[i])
-    return result
-
-
-@compiled(inline=True, borrows=True)
+@compiled(merged=True, borrows=True)
 def whole_step(
-    z: Shape, rules: Array, step_matrix: Array, coupled: bool, in_cut: bool,
-    u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, shape: Shape,
-) -> Shape:  # fmt: skip
-    """The coordinates (2n,) after a whole step that meets the quintic through these ends."""
+    z: Any, rules: Array, step_matrix: Array, coupled: bool, in_cut: bool,
+    u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, end: Any,
+    shape: Shape,
+) -> Any:  # fmt: skip
+    """`end` as the coordinates (2n,) after a whole step that meets the quintic of these ends."""
     n = len(shape)
-    end = z
     if coupled:
         for i in range(2 * n):
             total = 0.0
             for j in range(2 * n):
                 total += step_matrix[i, j] * z[j]
-            end = tuple_setitem(end, i, total)
+            end = with_entry(end, i, total)
     else:
         for i in range(n):
             x, y = z[i], z[n + i]
-            end = tuple_setitem(end, i, rules[STEP_OWN, i] * x + rules[STEP_PARTNER, i] * y)
-            end = tuple_setitem(
+            end = with_entry(end, i, rules[STEP_OWN, i] * x + rules[STEP_PARTNER, i] * y)
+            end = with_entry(
                 end, n + i, rules[STEP_OWN, n + i] * y + rules[STEP_PARTNER, n + i] * x
             )
     if in_cut:
@@ -186,26 +179,24 @@ def whole_step(
                 + (rules[STEP_SURFACE + 2, i] * e0 + rules[STEP_SURFACE + 3, i] * u1)
                 + (rules[STEP_SURFACE + 4, i] * d1 + rules[STEP_SURFACE + 5, i] * e1)
             )
-            end = tuple_setitem(end, i, end[i] + more)
+            end = with_entry(end, i, end[i] + more)
     return end
 
 
-@compiled(inline=True, borrows=True)
-def add_held_forces(
-    rules: Array, on_tool: float, between: float, end: Shape, shape: Shape
-) -> Shape:
+@compiled(merged=True, borrows=True)
+def add_held_forces(rules: Array, on_tool: float, between: float, end: Any, shape: Shape) -> Any:
     """`end` with what forces, N, held for a whole step have done."""
     for i in range(2 * len(shape)):
         more = rules[STEP_TOOL_FORCE, i] * on_tool + rules[STEP_CUTTING_FORCE, i] * between
-        end = tuple_setitem(end, i, end[i] + more)
+        end = with_entry(end, i, end[i] + more)
     return end
 
 
-@compiled(inline=True, borrows=True)
+@compiled(merged=True, borrows=True)
 def add_unbalance(
-    rules: Array, f0: float, g0: float, h0: float, f1: float, g1: float, h1: float, end: Shape,
+    rules: Array, f0: float, g0: float, h0: float, f1: float, g1: float, h1: float, end: Any,
     shape: Shape,
-) -> Shape:  # fmt: skip
+) -> Any:  # fmt: skip
     """`end` with what the force of an unbalance has done in a whole step, by its ends, N."""
     for i in range(2 * len(shape)):
         more = (
@@ -213,12 +204,12 @@ def add_unbalance(
             + (rules[STEP_UNBALANCE + 2, i] * h0 + rules[STEP_UNBALANCE + 3, i] * f1)
             + (rules[STEP_UNBALANCE + 4, i] * g1 + rules[STEP_UNBALANCE + 5, i] * h1)
         )
-        end = tuple_setitem(end, i, end[i] + more)
+        end = with_entry(end, i, end[i] + more)
     return end
 
 
 @compiled(inline=True, borrows=True)
-def read_outputs(outputs: Array, z: Array | Shape, out: Array, shape: Shape) -> None:
+def read_outputs(outputs: Array, z: Any, out: Array, shape: Shape) -> None:
     """What the coordinates mean (OUTPUTS,), by the outputs (2n + 1, OUTPUTS) of the regime."""
     for j in range(OUTPUTS):
         out[j] = outputs[2 * len(shape), j]

@@ -39,7 +39,7 @@ def room_for(modes: int) -> Array:
     """Room for a call of `advance`."""
     width = 2 * modes
     return surface.aligned(
-        8 * _LINE + _whole_lines(width) + (TERMS + 5) * _whole_lines(width + TERMS)
+        8 * _LINE + 3 * _whole_lines(width) + (TERMS + 5) * _whole_lines(width + TERMS)
     )
 
 
@@ -187,6 +187,7 @@ def advance(
     width = _whole_lines(n2 + TERMS)
     series = 8 * _LINE + _whole_lines(n2)
     work = series + TERMS * width
+    more = work + 5 * width
     scratch = Scratch(
         room[:PIECE_SIZE], room[8 * _LINE : 8 * _LINE + n2],
         room[_LINE : _LINE + layout.OUTPUTS],
@@ -194,6 +195,7 @@ def advance(
         room[work : work + 5 * (n2 + TERMS)].reshape((5, n2 + TERMS)),
         room[2 * _LINE : 2 * _LINE + 6], room[3 * _LINE : 3 * _LINE + 6],
         room[4 * _LINE : 4 * _LINE + 6], room[5 * _LINE : 5 * _LINE + TERMS],
+        room[more : more + 2 * n2].reshape((2, n2)),
     )  # fmt: skip
     # No literals: each would have the loops compiled once more.
     row, found, status = int(_NONE[0]), int(_NONE[0]), int(_NONE[0])
@@ -205,7 +207,7 @@ def advance(
         regime = counts[layout.REGIME]
         row = take_plain_steps(
             numbers, z, counts, nodes, settings, rules[regime], outputs[regime], direct[regime],
-            matrices[regime, 1], out, row, scratch.seen, shape,
+            matrices[regime, 1], out, row, scratch.seen, scratch.room, shape,
         )  # fmt: skip
         if row == out.shape[0]:
             break

@@ -105,7 +105,7 @@ def test_a_whole_step_is_the_piece_of_that_length(machine: Machine, regime: int)
     in_cut = bool(regime & layout.IN_CUT)
     call: Any = propagation
     found = call.whole_step(
-        tuple(z), rules, step_matrix, not basis.in_pairs, in_cut, *ends, (0.0,) * n
+        z, rules, step_matrix, not basis.in_pairs, in_cut, *ends, np.empty(2 * n), (0.0,) * n
     )
     found = call.add_held_forces(rules, _TOOL_FORCE, _BETWEEN, found, (0.0,) * n)
     found = call.add_unbalance(rules, *turning, found, (0.0,) * n)
