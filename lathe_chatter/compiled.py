@@ -71,7 +71,7 @@ def _numba_set(**options: Any) -> Iterator[None]:
             setattr(numba.config, name, value)
 
 
-def compiled(
+def compiled(  # noqa: PLR0913 -- one keyword for each fact about a function
     *,
     inline: bool = False,
     merged: bool = False,
