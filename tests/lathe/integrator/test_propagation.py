@@ -104,11 +104,11 @@ def test_a_whole_step_is_the_piece_of_that_length(machine: Machine, regime: int)
     step_matrix = expm(basis.generator)
     in_cut = bool(regime & layout.IN_CUT)
     call: Any = propagation
-    found = call.whole_step(
+    found = call.whole_step.py_func(
         z, rules, step_matrix, not basis.in_pairs, in_cut, *ends, np.empty(2 * n), (0.0,) * n
     )
-    found = call.add_held_forces(rules, _TOOL_FORCE, _BETWEEN, found, (0.0,) * n)
-    found = call.add_unbalance(rules, *turning, found, (0.0,) * n)
+    found = call.add_held_forces.py_func(rules, _TOOL_FORCE, _BETWEEN, found, (0.0,) * n)
+    found = call.add_unbalance.py_func(rules, *turning, found, (0.0,) * n)
     hold, turns = np.empty(6), np.empty(6)
     propagation.quintic(*ends, hold)
     propagation.quintic(*turning, turns)
