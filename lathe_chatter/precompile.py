@@ -16,6 +16,7 @@ import numpy as np
 from numba.core import event
 
 from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.detection.identification import cutting_limit, mechanics_of
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
@@ -89,7 +90,9 @@ def _detect() -> None:
     samples = np.zeros((2000, len(SAMPLE_COLUMNS)))
     samples[:, 0] = np.arange(2000) / _SAMPLE_RATE
     samples[:, 1] = samples[:, 0] * _CUT.spindle_speed_rpm / 60.0
+    samples[0, 2:] = np.nan  # a sensor that is slow to begin takes a function more
     ChatterDetector().update(samples, SAMPLE_COLUMNS)
+    cutting_limit(mechanics_of(Machine(), 1.0, 2.0), 1.0, 1.0, 1.0, 1j)
     rightmost_root(Machine(), _CUT.spindle_speed_rpm, _CUT.depth_of_cut, seated=True)
     safe_limit(Machine(), _CUT, _CUT.spindle_speed_rpm)
 

@@ -45,23 +45,17 @@ def new_channels() -> Records:
     return channels
 
 
-def faults_of(channels: Records, time: float, names: tuple[str, ...]) -> tuple[str, ...]:
+def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
     """What is wrong with channels that should be there, in words.
 
     Args:
-        channels: From `watch_channels` (3,).
-        time: Now, s.
+        causes: From `watch_channels`.
         names: Of the channels; empty where there is none.
     """
-    found = []
-    for name, channel in zip(names, channels, strict=True):
-        if not name:
-            continue
-        if time - channel['bad_at'] < _AFTERWARDS:
-            found.append(f'{name} {_CAUSES[1 if channel["stood_still"] else 0]}')
-        elif time - channel['rail_at'] < _RAIL:
-            found.append(f'{name} {_CAUSES[2]}')
-    return tuple(found)
+    if not causes:
+        return ()
+    found = ((name, (causes >> 2 * number) & 3) for number, name in enumerate(names))
+    return tuple(f'{name} {_CAUSES[cause - 1]}' for name, cause in found if name and cause)
 
 
 @compiled(inner=True)
@@ -79,14 +73,31 @@ def _meets_rail(channel: Any, value: float) -> bool:
     return False
 
 
+@compiled(inner=True)
+def _causes(channels: Records, time: float) -> int:
+    """What is wrong now, as `watch_channels` returns it."""
+    causes = 0
+    for number in range(3):
+        channel = channels[number]
+        if time - channel.bad_at < _AFTERWARDS:
+            causes += (1 + (channel.stood_still != 0)) << 2 * number
+        elif time - channel.rail_at < _RAIL:
+            causes += 3 << 2 * number
+    return causes
+
+
 @compiled()
-def watch_channels(rows: Array, channels: Records) -> None:
+def watch_channels(rows: Array, channels: Records) -> int:
     """Follow the channels; what stands still is made no number.
 
     Args:
         rows: Time, spindle angle, tool and workpiece displacement, and, written: the sum of
             1, 2 and 4 for each of them that has been well for a while (n, 5).
         channels: From `new_channels`, changed in place.
+
+    Returns:
+        What is wrong after the last row: two bits for each channel, the lowest for the first; 0
+        for nothing, else the number of a cause, from 1 on.
     """
     for i in range(rows.shape[0]):
         time, well = rows[i, 0], 0.0
@@ -124,3 +135,4 @@ def watch_channels(rows: Array, channels: Records) -> None:
             if not 0.0 <= time - channel.bad_at < _AFTERWARDS:
                 well += 2.0**number
         rows[i, 4] = well
+    return _causes(channels, rows[-1, 0])

@@ -16,7 +16,7 @@ from lathe_chatter.detection.filters import band_of, design, gain, thinning_of
 from lathe_chatter.detection.framing import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
 from lathe_chatter.detection.machine_fit import MachineFit, Verdict
-from lathe_chatter.detection.records import record
+from lathe_chatter.detection.records import record, values_of
 from lathe_chatter.detection.signals import HOP_SUMS, SETTINGS, new_memory
 from lathe_chatter.detection.speed_advice import Identified, SpeedAdviser
 from lathe_chatter.model import Machine
@@ -209,14 +209,14 @@ class ChatterDetector:
                 self._plain,
                 self._state,
             )
-            if now.fit_is_due:
+            if now['fit_is_due']:
                 now.fit_is_due = 0
                 self._fit.close_block(self._memory.fit, jumped=bool(now.holding))
                 self._weigh_machine()
                 self._margin = self._new_margin()
-            if not now.alarmed:
+            if not now['alarmed']:
                 self._adviser.forget()
-            elif self._adviser.is_due(since := int(now.since_alarm)):
+            elif self._adviser.is_due(since := int(now['since_alarm'])):
                 modelled = self._mode is Mode.FULL and bool(self._settings['believed'][0])
                 self._adviser.consider(self._identified(), since, modelled=modelled)
         self._estimate = self._new_estimate(float(hops.times[-1]))
@@ -281,35 +281,36 @@ class ChatterDetector:
         )
 
     def _new_estimate(self, time: float) -> Estimate:
-        now, mode, words = self._now, self._mode, self._machine_in_words()
+        now = values_of(self._state.now)  # a field of a record takes longer than all at once
+        mode, words = self._mode, self._machine_in_words()
         if mode is Mode.NO_MACHINE and self._told is not None:
             mode = Mode.MANY_MODES
         if words:
             mode = Mode.CORRECTED if self._settings['believed'][0] else Mode.MISFIT
-        stiffness = float(now.stiffness)
+        stiffness = now['stiffness']
         engaged = None
         if self._machine is not None and math.isfinite(stiffness):
             bearing = self._machine.bearing_stiffness
             engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
         return Estimate(
             time,
-            STATES[int(now.state)],
-            bool(now.alarmed),
+            STATES[now['state']],
+            bool(now['alarmed']),
             mode,
-            float(now.growth),
-            float(now.growth_error),
-            float(now.omega) / (2.0 * math.pi),
-            float(now.amplitude),
+            now['growth'],
+            now['growth_error'],
+            now['omega'] / (2.0 * math.pi),
+            now['amplitude'],
             self._speed() * 60.0,
-            float(now.cutting),
+            now['cutting'],
             stiffness,
             engaged,
-            float(now.once_per_turn),
-            float(now.score),
+            now['once_per_turn'],
+            now['score'],
             self._adviser.advice,
             self._framer.faults(),
             words,
-            *(self._margin if mode.knows_machine and not now.alarmed else (math.nan, math.nan)),
+            *(self._margin if mode.knows_machine and not now['alarmed'] else (math.nan, math.nan)),
         )
 
 

@@ -82,15 +82,13 @@ class Framer:
         self._names: tuple[str, ...] = ()
         self._places: NDArray[np.int64] = np.full(5, -1)
         self._incomplete = False
-        self._newest, self.blind = math.nan, False
-        self._channels = new_channels()
+        self._labels: tuple[str, ...] = ()
+        self.blind = False
+        self._channels, self._causes = new_channels(), 0
 
     def faults(self) -> tuple[str, ...]:
         """What is wrong with the sensors that should be there, each in some words."""
-        names = (_ANGLE, _TOOL, _WORKPIECE)
-        places = self._places[1:4]
-        labels = tuple(n if place >= 0 else '' for n, place in zip(names, places, strict=True))
-        return faults_of(self._channels, self._newest, labels)
+        return faults_of(self._causes, self._labels)
 
     def restart_stretch(self) -> None:
         """Tell the format of the samples once more."""
@@ -172,7 +170,7 @@ class Framer:
         drop = at + (not finite or (at == 0 and math.isnan(self._last)))
         self.restart_stretch()
         if restarted:
-            self._channels = new_channels()
+            self._channels, self._causes = new_channels(), 0
         return restarted, rows[drop:]
 
     def _signals(self, samples: Array, columns: Sequence[str]) -> Array:
@@ -188,6 +186,7 @@ class Framer:
                 )
             self._names, self._places = names, np.array([*places, 0])
             self._incomplete = min(places) < 0
+            self._labels = tuple(name if name in names else '' for name in wanted[1:])
         if samples.ndim != 2 or samples.shape[1] != len(names):
             raise LayoutError(
                 f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
@@ -195,10 +194,10 @@ class Framer:
         found: Array = samples.take(self._places, axis=1)
         if self._incomplete:
             found[:, self._places < 0] = math.nan
-        watch_channels(found, self._channels)
         if len(found):
-            self._newest = float(found[-1, 0])
-            self.blind = not np.isfinite(found[-1, 2:4]).any()
+            self._causes = watch_channels(found, self._channels)
+            tool, workpiece = found[-1, 2:4].tolist()
+            self.blind = not (math.isfinite(tool) or math.isfinite(workpiece))
         return found
 
 

@@ -27,3 +27,8 @@ def record(kind: np.dtype[Any], value: float = 0.0, **values: object) -> Records
         if name in values or kind[name].kind == 'f':
             one[name] = values.get(name, value)
     return one
+
+
+def values_of(one: Records) -> dict[str, Any]:
+    """The fields of one record (1,) by name, as plain numbers."""
+    return dict(zip(one.dtype.names or (), one.item(), strict=True))

@@ -75,6 +75,7 @@ RECORDED_TOPICS = [
             'frequency',
             'amplitude',
             'recommended_speed_rpm',
+            'margin',
         )
     ),
     '/parameter_events',

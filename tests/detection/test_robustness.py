@@ -236,6 +236,14 @@ def test_a_gap_after_the_first_few_samples_is_survived(before: int) -> None:
     assert _watch(detector, _seconds(lathe, 3.0))[-1].state == 'stable'
 
 
+@pytest.mark.parametrize('begin', [0, 5, 32])
+def test_displacements_that_are_no_numbers_at_first_are_survived(begin: int) -> None:
+    """Sensors that begin late, or fail while the sample rate is not known yet."""
+    samples = _seconds(VirtualLathe(cut=_cut()), 3.0)
+    samples[begin : begin + 50, [_TOOL, _WORKPIECE]] = np.nan
+    assert _watch(ChatterDetector(), samples)[-1].state == 'stable'
+
+
 def test_two_lathes_on_one_topic_are_no_exception() -> None:
     """Blocks of both come in turn, some backwards, some without numbers."""
     rng = np.random.default_rng(0)

@@ -18,6 +18,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
+from lathe_chatter.nodes.parameters import RECORDED_TOPICS
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
 
@@ -272,6 +273,15 @@ def test_without_a_model_chatter_is_flagged_all_the_same(
         ),
         'the mode',
     )
+
+
+def test_the_recorder_keeps_all_that_the_monitor_says(start: Callable[..., Any]) -> None:
+    """Every topic of its own, as the graph knows them."""
+    node = start(MonitorNode)
+    topics = node.get_publisher_names_and_types_by_node('chatter_monitor', node.get_namespace())
+    own = {name.lstrip('/') for name, _types in topics if 'chatter_monitor/' in name}
+    assert 'chatter_monitor/chatter' in own
+    assert own <= set(RECORDED_TOPICS)
 
 
 @pytest.mark.parametrize(
