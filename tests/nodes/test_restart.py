@@ -114,6 +114,8 @@ def test_a_killed_lathe_is_missed_and_the_next_one_followed(cell: Cell) -> None:
     assert float(again[2]) >= 0.0  # how late depends on how busy the machine is
 
     cell.wait(lambda: len(lives()) == 2, 'the parameters of the next one')
+    restarted = 'after the lathe started again'  # said up to 10 s later
+    cell.wait(lambda: any(restarted in s for s in reports.sentences('run_recorder')), 'that')
     cell.nodes.interrupt('/run_recorder')
     run = read_run(cell.run())
     first, second = np.split(times := recorded(run), np.flatnonzero(np.diff(times) < 0.0) + 1)
