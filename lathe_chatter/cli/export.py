@@ -17,7 +17,7 @@ from lathe_chatter.recording.export import (
     to_parquet,
 )
 from lathe_chatter.recording.sample_series import Selection
-from lathe_chatter.recording.unroll import unroll
+from lathe_chatter.recording.unrolled_export import unroll
 
 NAME = 'export'
 HELP = 'write the samples of a recorded run as CSV, Parquet, MAT, HDF5, or a message per sample'

@@ -13,7 +13,7 @@ from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.report import draw_run
-from lathe_chatter.report.history import History, read_history
+from lathe_chatter.report.run_history import History, read_history
 from lathe_chatter.report.signal_views import Excerpt, excerpts_of
 from lathe_chatter.stability import root_of
 

@@ -19,8 +19,8 @@ from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, plain,
 from lathe_chatter.errors import OutputError
 from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
 from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
-from lathe_chatter.paper.overview import draw_conditions, draw_findings, draw_growth
 from lathe_chatter.paper.page import OVERVIEWS, PAGE, write_page
+from lathe_chatter.paper.summary_pictures import draw_conditions, draw_findings, draw_growth
 from lathe_chatter.plot_style import files_of_picture
 
 NAME = 'reproduce'

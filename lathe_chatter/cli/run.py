@@ -15,7 +15,7 @@ from lathe_chatter.errors import RunFailedError, RunReadError
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.entry_points import no_ros
 from lathe_chatter.recording import read_run
-from lathe_chatter.report.history import read_history
+from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,

@@ -14,7 +14,7 @@ from lathe_chatter.cli.report import show_run
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.cut_events import Knock
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.report.history import read_history
+from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,

@@ -8,7 +8,7 @@ here it is simulated.
 from __future__ import annotations
 
 from lathe_chatter.knocks.knock_map import KnockGrid, KnockMap, read_knock_map, run_knock_map
-from lathe_chatter.knocks.outcome import Outcome, follow_knock, linear_reach, resting_state
+from lathe_chatter.knocks.knock_outcome import Outcome, follow_knock, linear_reach, resting_state
 from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
 
 __all__ = [

@@ -13,7 +13,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.knocks.outcome import follow_knock, linear_reach
+from lathe_chatter.knocks.knock_outcome import follow_knock, linear_reach
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.stability import contact_at

@@ -91,13 +91,13 @@ class BoundedLog:
     def look(self) -> None:
         """Tell what was held back long enough; called about once a second."""
         for kind in self._kinds.values():
-            self._tell_held(kind)
+            self._log_held_back(kind)
 
     def _take(self, severity: LoggingSeverity, sentence: str, name: str) -> None:
         if name not in self._kinds and len(self._kinds) >= MAX_KINDS:
             name = ''
         kind = self._kinds.setdefault(name, _Kind(self._now()))
-        self._tell_held(kind)
+        self._log_held_back(kind)
         if kind.logged < BURST:
             kind.logged += 1
             self._log(severity, sentence)
@@ -105,7 +105,7 @@ class BoundedLog:
             kind.held += 1
             kind.last, kind.severity = sentence, severity
 
-    def _tell_held(self, kind: _Kind) -> None:
+    def _log_held_back(self, kind: _Kind) -> None:
         """Begin a new period, if one is over, with what the old one held back."""
         now = self._now()
         if now - kind.since < PERIOD:

@@ -30,7 +30,7 @@ def run_recorder() -> None:
 
 def cell() -> None:
     """Run lathe, monitor and recorder in one process."""
-    _run('cell')
+    _run('composition')
 
 
 def no_ros(error: ImportError) -> str:

@@ -52,7 +52,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         self.player = ScenarioPlayer(scenario)
         self.failure: ScenarioFailedError | None = None
         self.playing = False
-        self._tell = tell
+        self._log = tell
         self._in_flight = False
         self._estimates = dict.fromkeys(_ESTIMATES, math.nan)
         self._client = self.create_client(
@@ -99,16 +99,16 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
 
     def _on_flag(self, message: Bool) -> None:
         known = self._estimates
-        what = self.player.hear_flag(
+        what = self.player.on_flag(
             self.time, known['frequency'], known['growth_rate'], up=message.data
         )
         if what:
-            self._tell(f'{self.time:7.2f} s  {what}')
+            self._log(f'{self.time:7.2f} s  {what}')
 
     # -- acting ----------------------------------------------------------------------------
 
     def _play(self, step: Step) -> None:
-        self._tell(f'{self.time:7.2f} s  {step}')
+        self._log(f'{self.time:7.2f} s  {step}')
         request = SetParametersAtomically.Request(
             parameters=[
                 Parameter(name, value=value).to_parameter_msg()

@@ -12,17 +12,17 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 from lathe_chatter.errors import LatheChatterError, RecordingFailedError, reason_of
 from lathe_chatter.nodes import recorder_services
-from lathe_chatter.nodes.control import Answer
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import RECORDER
 from lathe_chatter.nodes.real_time import Schedule, spin_in_ticks
-from lathe_chatter.nodes.recorded_topic import RecordedTopic
+from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.nodes.recording_status import news, recording_status
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
+from lathe_chatter.nodes.run_control import Answer
 from lathe_chatter.nodes.run_folders import RunFolders
-from lathe_chatter.nodes.topic_watch import TopicWatch, selection
+from lathe_chatter.nodes.topic_discovery import TopicWatch, selection
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence
 from lathe_chatter.recording.provenance import (
@@ -35,7 +35,7 @@ from lathe_chatter.recording.provenance import (
     parameter_values,
 )
 from lathe_chatter.recording.receive_stalls import ReceiveStalls
-from lathe_chatter.recording.run_log import RunLog
+from lathe_chatter.recording.run_events import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.snapshot import SnapshotBuffer
 from lathe_chatter.samples.continuity import BlockOrder

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
-from lathe_chatter.nodes.recorded_topic import RecordedTopic
+from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.recording.receive_stalls import ReceiveStalls
-from lathe_chatter.recording.run_log import Discontinuity, RunLog
+from lathe_chatter.recording.run_events import Discontinuity, RunLog
 from lathe_chatter.samples.continuity import BlockOrder
 
 

@@ -18,9 +18,9 @@ from lathe_chatter.errors import RunFailedError
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
+from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameters import MONITOR
-from lathe_chatter.nodes.process_group import ProcessGroup
 from lathe_chatter.scenario import Scenario
 
 try:

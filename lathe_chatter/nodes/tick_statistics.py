@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.nodes.control import RunControl, RunState
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.real_time import SECOND, Pacer, RequestLoad
+from lathe_chatter.nodes.run_control import RunControl, RunState
 
 _MICRO = 1e-3
 """us in a ns."""

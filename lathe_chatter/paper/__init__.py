@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lathe_chatter.paper.findings import Findings, find
+from lathe_chatter.paper.open_questions import Findings, find
 from lathe_chatter.paper.reproduction import Literal, Reproduced, reproduce_run
 from lathe_chatter.paper.runs import PAPER_RUNS, Pace, PaperRun
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from lathe_chatter.paper.figures import Picture, paper_pictures
-from lathe_chatter.paper.findings import Findings, StiffnessEffect, Window
+from lathe_chatter.paper.open_questions import Findings, StiffnessEffect, Window
 from lathe_chatter.paper.reproduction import AGREEMENT, Reproduced
 from lathe_chatter.paper.runs import PAPER_RUNS, run_named
-from lathe_chatter.paper.screening import Reading
+from lathe_chatter.paper.screening_function import Reading
 
 OVERVIEWS = (
     Picture('growth', 'Growth in time', 'Each run against the slope that its root gives it.'),

@@ -1,7 +1,7 @@
 """A run on disk: a rosbag2 folder of MCAP files that open whatever happened to their writer."""
 
 from lathe_chatter.errors import RunReadError
-from lathe_chatter.recording.lathe_run import LatheRun
+from lathe_chatter.recording.lathe_run_writer import LatheRun
 from lathe_chatter.recording.recover import Recovery, recover
 from lathe_chatter.recording.replay import Difference
 from lathe_chatter.recording.resimulate import Resimulation, resimulate

@@ -11,7 +11,7 @@ import yaml
 
 from lathe_chatter.recording.metadata import FILE_NAME
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.verification import Verification
+from lathe_chatter.recording.verification_result import Verification
 
 _NOTE = 'rosbag2'
 """Name of the record in which writers keep the same in the file itself."""
@@ -27,20 +27,20 @@ def check_metadata(found: Verification) -> None:
         told = _counts(folder.metadata)
         total = int(folder.metadata.get('message_count', sum(told.values())))
     except (KeyError, TypeError, ValueError, AttributeError):
-        found.lose(f'{FILE_NAME} does not count the messages of each topic.')
+        found.add_loss(f'{FILE_NAME} does not count the messages of each topic.')
         return
     known = len(found.findings)
     for name in sorted({*told, *found.messages}):
         if told[name] != found.messages[name]:
-            found.lose(
+            found.add_loss(
                 f'{FILE_NAME} counts {told[name]} messages of {name}, and '
                 f'{found.messages[name]} are there.'
             )
     if len(found.findings) == known and total != sum(told.values()):
-        found.lose(f'{FILE_NAME} counts {total} messages, and {sum(told.values())} are there.')
+        found.add_loss(f'{FILE_NAME} counts {total} messages, and {sum(told.values())} are there.')
     if len(found.findings) == known:
         for text in _differences(found.run, folder.metadata):
-            found.lose(f'{FILE_NAME} {text}.')
+            found.add_loss(f'{FILE_NAME} {text}.')
 
 
 def _counts(metadata: dict[str, Any]) -> Counter[str]:

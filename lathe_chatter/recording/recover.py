@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lathe_chatter.recording.atomic_output import atomic_folder
-from lathe_chatter.recording.completeness import lost_at_the_end
 from lathe_chatter.recording.mcap_chunk import OpenChunk, record_bytes
+from lathe_chatter.recording.mcap_file import Note, RecordedFile, offered_qos
 from lathe_chatter.recording.mcap_reader import Damage
 from lathe_chatter.recording.metadata import Topic
+from lathe_chatter.recording.missing_files import lost_at_the_end
 from lathe_chatter.recording.provenance import RECOVERED
 from lathe_chatter.recording.run import Run, read_run
-from lathe_chatter.recording.run_file import Note, RecordedFile, offers_of
 from lathe_chatter.recording.split_files import CLOSED, RunFiles, TopicRecords
 
 _NOT_COPIED = (CLOSED, 'rosbag2')
@@ -140,7 +140,7 @@ class _Copy:
                 schema.name if schema is not None else '',
                 '',
                 channel.metadata.get('topic_type_hash', ''),
-                tuple(offers_of(channel)),
+                tuple(offered_qos(channel)),
                 channel.message_encoding,
             )
             first = schema_record if schema is not None and new else b''

@@ -11,7 +11,7 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.recording.cut_log import CutSession
-from lathe_chatter.recording.run_log import RunLog, SamplesReceived
+from lathe_chatter.recording.run_events import RunLog, SamplesReceived
 
 SUMMARY = 'lathe_chatter/summary'
 """Name of the record; every value is JSON."""

@@ -17,8 +17,8 @@ import numpy as np
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
+from lathe_chatter.recording.mcap_file import Raw, RecordedFile
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.run_file import Raw, RecordedFile
 from lathe_chatter.recording.sample_reader import TIME, SampleBlocks
 
 _STEP_BACK = 10_000_000

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.recording.run_file import RecordedFile
+from lathe_chatter.recording.mcap_file import RecordedFile
 from lathe_chatter.recording.sample_reader import SampleBlocks, as_received, as_written
 
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.chunk_messages import HEAD, Messages, messages_of
+from lathe_chatter.recording.mcap_file import RecordedFile
 from lathe_chatter.recording.mcap_reader import Chunk, Damage, read_chunk
-from lathe_chatter.recording.run_file import RecordedFile
 from lathe_chatter.samples.codec import BlockLayout, block_layout
 
 TIME = 'time'

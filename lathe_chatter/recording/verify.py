@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, step_sentence
-from lathe_chatter.recording.completeness import (
+from lathe_chatter.recording.mcap_file import Note, offered_qos
+from lathe_chatter.recording.metadata_check import check_metadata
+from lathe_chatter.recording.missing_files import (
     check_end,
     check_files,
     check_order,
     noted,
 )
-from lathe_chatter.recording.metadata_check import check_metadata
 from lathe_chatter.recording.provenance import (
     PUBLISHERS,
     RECEPTION,
@@ -27,9 +28,8 @@ from lathe_chatter.recording.provenance import (
     noted_pauses,
 )
 from lathe_chatter.recording.run import Run, read_run
-from lathe_chatter.recording.run_file import Note, offers_of
 from lathe_chatter.recording.sequence_gaps import Numbering
-from lathe_chatter.recording.verification import Finding, SampleCount, Verification
+from lathe_chatter.recording.verification_result import Finding, SampleCount, Verification
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.samples.continuity import Continuity, missing_in, time_text
 
@@ -81,7 +81,7 @@ def _check_messages(found: Verification, progress: Progress) -> dict[str, Number
         counted = file.known.statistics
         undamaged = len(found.run.damage) == damages
         if counted is not None and undamaged and counted.message_count != there:
-            found.lose(
+            found.add_loss(
                 f'The summary of {file.path.name} counts {counted.message_count} messages, and '
                 f'{there} are there.'
             )
@@ -95,7 +95,7 @@ def _check_messages(found: Verification, progress: Progress) -> dict[str, Number
         if len(numbered):
             numbering = numberings[topic] = _numbering(numbered)
             numbering.settle(publishers.get(topic, 1), math.inf)
-            _tell_numbering(found, topic, numbering, publishers.get(topic, 1))
+            _report_numbering(found, topic, numbering, publishers.get(topic, 1))
     return numberings
 
 
@@ -114,7 +114,7 @@ def _steps_back(heads: NDArray[Any]) -> int:
     return int(np.count_nonzero(heads['sequence'][1:] < heads['sequence'][:-1]))
 
 
-def _tell_numbering(
+def _report_numbering(
     found: Verification, topic: str, numbering: Numbering, publishers: int
 ) -> None:
     """Say what the numbers of a topic say is missing."""
@@ -126,14 +126,14 @@ def _tell_numbering(
     ]
     missing = sum(loss.messages for loss in losses)
     if len(losses) > _MANY:
-        found.lose(
+        found.add_loss(
             f'{topic}: {missing} messages are missing in {len(losses)} places between '
             f'{_clock(losses[0].since)} and {_clock(losses[-1].until)}, '
             f'{max(loss.messages for loss in losses)} of them in one.'
         )
     else:
         for loss in losses:
-            found.lose(
+            found.add_loss(
                 f'{topic}: {loss.messages} messages are missing between {_clock(loss.since)} and '
                 f'{_clock(loss.until)}.'
             )
@@ -148,7 +148,7 @@ def _publishers(run: Run) -> dict[str, int]:
     numbers: dict[str, int] = {}
     for file in run.opened:
         for channel in file.known.channels.values():
-            numbers[channel.topic] = max(len(offers_of(channel)), 1)
+            numbers[channel.topic] = max(len(offered_qos(channel)), 1)
     for note in run.notes():
         for topic in note.values if note.name == PUBLISHERS else ():
             count = noted(note, topic)
@@ -176,20 +176,20 @@ def _check_samples(found: Verification, progress: Progress) -> None:
                 last = float(times[-1])
                 count += len(times)
         except (LayoutError, ValueError) as error:
-            found.lose(f'{topic}: {error} What comes after it was not looked at.')
+            found.add_loss(f'{topic}: {error} What comes after it was not looked at.')
         found.samples[topic] = SampleCount(count, first, last)
         if strange:
-            found.lose(f'{topic}: the times of {strange} samples are no numbers.')
+            found.add_loss(f'{topic}: the times of {strange} samples are no numbers.')
         late = missing_in((0.0, first), continuity.step) if count and continuity.step else 0
         if late > 0:
             found.remark(
                 f'{topic}: the record begins at {time_text(first)} of simulated time, '
                 f'{late} samples late.'
             )
-        _tell_breaks(found, topic, continuity)
+        _report_breaks(found, topic, continuity)
 
 
-def _tell_breaks(found: Verification, topic: str, continuity: Continuity) -> None:
+def _report_breaks(found: Verification, topic: str, continuity: Continuity) -> None:
     """Say where samples do not follow those before: where there are many places, in short."""
     pauses = noted_pauses(found.run.notes(), topic)
     gaps, restarts = continuity.gap_places, continuity.restart_places
@@ -202,7 +202,7 @@ def _tell_breaks(found: Verification, topic: str, continuity: Continuity) -> Non
         )
     if len(gaps) > _MANY:
         longest = max(gaps, key=lambda gap: gap[1] - gap[0])
-        found.lose(
+        found.add_loss(
             f'{topic}: {continuity.lost} samples are missing in {len(gaps)} gaps between '
             f'{time_text(gaps[0][0])} and {time_text(gaps[-1][1])} of simulated time, most of '
             f'them, {missing_in(longest, continuity.step)}, between {time_text(longest[0])} and '
@@ -210,7 +210,7 @@ def _tell_breaks(found: Verification, topic: str, continuity: Continuity) -> Non
         )
         gaps = []
     for gap in gaps:
-        found.lose(
+        found.add_loss(
             f'{topic}: {missing_in(gap, continuity.step) or "some"} samples are missing '
             f'between {time_text(gap[0])} and {time_text(gap[1])} of simulated time.'
         )
@@ -245,9 +245,9 @@ def _check_reception(
                 continue
             lost, there = heard.get('lost', 0), found.messages[topic]
             if lost > numberings.get(topic, Numbering()).lost:
-                found.lose(f'{topic}: the recorder missed {lost} messages on the way to it.')
+                found.add_loss(f'{topic}: the recorder missed {lost} messages on the way to it.')
             if heard.get('messages', there) + heard.get('repeated', 0) != there:
-                found.lose(
+                found.add_loss(
                     f'{topic}: {heard["messages"]} messages were recorded, and {there} are there.'
                 )
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from types import TracebackType
 
 from lathe_chatter.errors import DiskFullError, RunExistsError
+from lathe_chatter.recording.counts_on_disk import UnfinishedCounts
 from lathe_chatter.recording.disk_thread import DiskThread
 from lathe_chatter.recording.mcap_chunk import Compression, OpenChunk
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.split_files import CLOSED, RunFiles, TopicTable
-from lathe_chatter.recording.unfinished_counts import UnfinishedCounts
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
 

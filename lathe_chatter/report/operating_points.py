@@ -10,7 +10,7 @@ import numpy as np
 
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.plot_style import ALARM
-from lathe_chatter.report.history import History
+from lathe_chatter.report.run_history import History
 from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import Machine
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for, widen
-from lathe_chatter.report.history import History
+from lathe_chatter.report.run_history import History
 from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.stability import contact_at, root_of
 

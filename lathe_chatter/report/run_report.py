@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lathe_chatter.plot_style import new_figure, save
-from lathe_chatter.report.history import History
 from lathe_chatter.report.operating_points import bearings_of, draw_path
 from lathe_chatter.report.phase_and_spectrum import draw_portrait, draw_section, draw_spectrum
+from lathe_chatter.report.run_history import History
 from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.report.time_histories import draw_time_histories
 

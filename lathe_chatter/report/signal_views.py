@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut
-from lathe_chatter.report.history import History
+from lathe_chatter.report.run_history import History
 
 _LONGEST = 2.0
 """s that an excerpt has at most."""

@@ -24,7 +24,7 @@ from lathe_chatter.plot_style import (
     scale_for,
     widen,
 )
-from lathe_chatter.report.history import History
+from lathe_chatter.report.run_history import History
 from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:

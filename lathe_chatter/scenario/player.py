@@ -40,7 +40,7 @@ class ScenarioPlayer:
         at = self._steps[0].at if self._steps else None
         return math.inf if at is None else at
 
-    def hear_flag(self, time: float, frequency: float, growth_rate: float, *, up: bool) -> str:
+    def on_flag(self, time: float, frequency: float, growth_rate: float, *, up: bool) -> str:
         """Take notice of the monitor's flag.
 
         Args:

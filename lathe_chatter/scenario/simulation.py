@@ -121,7 +121,7 @@ class _Simulation:
         tell: Tell,
     ) -> None:
         self.player = ScenarioPlayer(scenario)
-        self._lathe, self._run, self._tell = lathe, run, tell
+        self._lathe, self._run, self._log = lathe, run, tell
         self._end = self._sample_of(scenario.duration)
         self._knocks = sorted(knocks, key=lambda knock: knock.time)
         self._detector: ChatterDetector | None = None
@@ -148,7 +148,7 @@ class _Simulation:
         if len(samples):
             self._run.write(samples)
             if self._detector is not None:
-                self._hear(self._detector.update(samples, self._lathe.columns))
+                self._on_estimate(self._detector.update(samples, self._lathe.columns))
         return not self._lathe.guard
 
     def _sample_of(self, time: float) -> int:
@@ -179,16 +179,16 @@ class _Simulation:
         self._lathe.retune(cut)
         if sentence:
             self._run.log(sentence)
-        self._tell(self._lathe.time, str(replace(step, changes=meant)))
+        self._log(self._lathe.time, str(replace(step, changes=meant)))
 
     def _knock(self, impulse: float) -> None:
         self._run.log(knock_sentence(self._lathe.time, impulse))
         self._lathe.knock(impulse)
-        self._tell(self._lathe.time, f'knock of {impulse:g} N s')
+        self._log(self._lathe.time, f'knock of {impulse:g} N s')
 
     # -- listening -------------------------------------------------------------------------
 
-    def _hear(self, estimate: Estimate) -> None:
+    def _on_estimate(self, estimate: Estimate) -> None:
         """Record what the detector says, the figures before the flag that they explain."""
         self._estimate = estimate
         changed = estimate.state != self._state or estimate.chatter != self._flag
@@ -204,13 +204,13 @@ class _Simulation:
         if estimate.chatter != self._flag:
             self._flag = estimate.chatter
             self._run.publish(f'{_MONITOR}/chatter', 'std_msgs/msg/Bool', data=self._flag)
-        what = self.player.hear_flag(
+        what = self.player.on_flag(
             self._lathe.time, estimate.frequency, estimate.growth_rate, up=estimate.chatter
         )
         if what:
-            self._tell(self._lathe.time, what)
+            self._log(self._lathe.time, what)
             self._told_advice = Advice()
         if estimate.chatter and estimate.advice.differs_from(self._told_advice):
             self._told_advice = estimate.advice
             words = estimate.advice.in_words(self._lathe.cut.depth_of_cut)
-            self._tell(self._lathe.time, f'advice: {words}')
+            self._log(self._lathe.time, f'advice: {words}')

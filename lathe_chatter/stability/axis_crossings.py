@@ -12,9 +12,9 @@ import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.stability.characteristic import receptance
+from lathe_chatter.stability.compiled_characteristic import ALPHA, BETA, DAMPING, STIFFNESS
 from lathe_chatter.stability.critical_depth import frequency_grid
 from lathe_chatter.stability.lobes import bands, crossing_frequencies, echo_phase
-from lathe_chatter.stability.sections import ALPHA, BETA, DAMPING, STIFFNESS
 
 _HALVINGS = 60
 

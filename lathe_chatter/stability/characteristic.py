@@ -28,7 +28,13 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Body, Cut, Machine
 from lathe_chatter.model.quantities import Quantity, quantity_of
-from lathe_chatter.stability.sections import ALPHA, BETA, DAMPING, SECTION_SIZE, STIFFNESS
+from lathe_chatter.stability.compiled_characteristic import (
+    ALPHA,
+    BETA,
+    DAMPING,
+    SECTION_SIZE,
+    STIFFNESS,
+)
 
 Complex: TypeAlias = NDArray[np.complexfloating[Any, Any]]
 Machines: TypeAlias = Machine | Sequence[Machine] | NDArray[np.object_]

@@ -26,7 +26,7 @@ from lathe_chatter.stability.characteristic import (
     Machines,
     ProcessDamping,
 )
-from lathe_chatter.stability.sections import DAMPING, STIFFNESS, receptance_at
+from lathe_chatter.stability.compiled_characteristic import DAMPING, STIFFNESS, receptance_at
 
 _NEAR_MODE = 0.15
 """Step of the grid of frequencies, as a part of the distance to the nearest mode."""

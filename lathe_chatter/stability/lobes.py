@@ -27,8 +27,8 @@ from lathe_chatter.stability.characteristic import (
     receptance,
     sections_of,
 )
+from lathe_chatter.stability.compiled_characteristic import BETA
 from lathe_chatter.stability.critical_depth import frequency_grid
-from lathe_chatter.stability.sections import BETA
 
 _HALVINGS = 60
 _LOBES = Quantity('number of lobes', low=1.0, high=1e6)

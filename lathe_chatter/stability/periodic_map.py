@@ -19,7 +19,7 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.stability.characteristic import ProcessDamping, sections_of
-from lathe_chatter.stability.sections import BETA, STIFFNESS
+from lathe_chatter.stability.compiled_characteristic import BETA, STIFFNESS
 
 ORDER = 16
 _ELEMENT_PHASE = 5.0

@@ -17,7 +17,13 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Machine
 from lathe_chatter.stability.characteristic import NO_DAMPING, Cuts, ProcessDamping
-from lathe_chatter.stability.sections import ALPHA, BETA, DAMPING, STIFFNESS, inverse
+from lathe_chatter.stability.compiled_characteristic import (
+    ALPHA,
+    BETA,
+    DAMPING,
+    STIFFNESS,
+    inverse,
+)
 
 UNDECIDED = -1
 """The count where the line passes through a root, within rounding."""

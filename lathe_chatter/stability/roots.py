@@ -24,8 +24,7 @@ from lathe_chatter.stability.characteristic import (
     Machines,
     ProcessDamping,
 )
-from lathe_chatter.stability.root_count import count_right_of, count_to_the_right
-from lathe_chatter.stability.sections import (
+from lathe_chatter.stability.compiled_characteristic import (
     BETA,
     DAMPING,
     STIFFNESS,
@@ -33,6 +32,7 @@ from lathe_chatter.stability.sections import (
     newton_step,
     receptance_at,
 )
+from lathe_chatter.stability.root_count import count_right_of, count_to_the_right
 
 _ITERATIONS = 12
 _ITERATIONS_DENSE = 60

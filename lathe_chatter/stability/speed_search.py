@@ -25,9 +25,9 @@ from lathe_chatter.stability.characteristic import (
     checked,
     sections_of,
 )
+from lathe_chatter.stability.compiled_characteristic import STIFFNESS
 from lathe_chatter.stability.critical_depth import critical_depth
 from lathe_chatter.stability.roots import rightmost_roots
-from lathe_chatter.stability.sections import STIFFNESS
 
 _SAMPLES = 9
 _ZOOMS = 2

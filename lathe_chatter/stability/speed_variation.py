@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.stability.characteristic import Complex, checked
-from lathe_chatter.stability.krylov import dominant_eigenvalue
+from lathe_chatter.stability.dominant_eigenvalue import dominant_eigenvalue
 from lathe_chatter.stability.periodic_map import (
     Element,
     Elements,

@@ -16,9 +16,9 @@ import lathe_chatter.nodes
 NODES = Path(lathe_chatter.nodes.__file__).parent
 TESTS = Path(__file__).parents[1]
 LATHE, CLOCK = 'nodes/test_lathe_node.py', 'nodes/test_followed_clock.py'
-CONTROL, STANDARD = 'nodes/test_control.py', 'nodes/test_simulation_services.py'
+CONTROL, STANDARD = 'nodes/test_run_control.py', 'nodes/test_simulation_services.py'
 MAIN, MONITOR = 'nodes/test_node_main.py', 'nodes/test_monitor_node.py'
-STATISTICS, GROUP = 'nodes/test_tick_statistics.py', 'nodes/test_process_group.py'
+STATISTICS, GROUP = 'nodes/test_tick_statistics.py', 'nodes/test_node_processes.py'
 
 SAID = {
     'lathe_node.py': {
@@ -126,7 +126,7 @@ SAID = {
             f'{LATHE}::test_the_guard_ends_the_run_and_a_reset_begins_another',
         ),
     },
-    'control.py': {
+    'run_control.py': {
         'One tick.': (
             'it is paused',
             f'{CONTROL}::test_a_step_is_refused_while_running_and_leaves_a_pause_as_it_is',
@@ -183,7 +183,7 @@ SAID = {
             f'{MAIN}::test_a_wrong_parameter_at_the_start_is_one_sentence_that_names_it',
         ),
     },
-    'process_group.py': {
+    'node_processes.py': {
         '{} ended with exit code {}: {}': (
             'the process has ended so, and this was its last line',
             f'{GROUP}::test_a_node_that_fails_is_named_with_its_last_words',

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut as ModelCut
-from lathe_chatter.nodes.control import RunControl
 from lathe_chatter.nodes.real_time import Pacer, RequestLoad
+from lathe_chatter.nodes.run_control import RunControl
 from lathe_chatter.nodes.tick_statistics import Durations, TickStatistics
 
 TICK = 2_000_000

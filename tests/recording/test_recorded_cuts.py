@@ -30,7 +30,7 @@ from lathe_chatter.recording.ros_messages import (
     parameters_bytes,
     topic_of_type,
 )
-from lathe_chatter.report.history import read_history
+from lathe_chatter.report.run_history import read_history
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 TICK = 20

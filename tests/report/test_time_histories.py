@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.report.history import History
-from lathe_chatter.report.run_samples import RunSamples
+from lathe_chatter.report.plotted_samples import RunSamples
+from lathe_chatter.report.run_history import History
 from lathe_chatter.report.time_histories import apart, draw_time_histories
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

@@ -17,7 +17,7 @@ def player_of(*steps: Step) -> ScenarioPlayer:
 
 
 def flag(player: ScenarioPlayer, time: float, *, up: bool) -> str:
-    return player.hear_flag(time, 120.04, 3.21, up=up)
+    return player.on_flag(time, 120.04, 3.21, up=up)
 
 
 def test_a_step_with_a_time_is_due_once_at_that_time() -> None:
@@ -60,6 +60,6 @@ def test_only_what_is_said_since_the_step_before_counts() -> None:
 def test_a_flag_that_is_as_it_was_is_no_news() -> None:
     player = player_of()
     assert not flag(player, 0.0, up=False)
-    assert player.hear_flag(1.0, math.nan, math.nan, up=True) == 'chatter flagged'
+    assert player.on_flag(1.0, math.nan, math.nan, up=True) == 'chatter flagged'
     assert not flag(player, 1.5, up=True)
     assert player.said == [FLAGGED]

@@ -12,7 +12,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.cut_events import Knock
 from lathe_chatter.model import Cut
 from lathe_chatter.recording import read_run, resimulate, verify
-from lathe_chatter.report.history import read_history
+from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import Scenario, Step, load_scenario, shipped_scenarios
 from lathe_chatter.scenario.simulation import needs_monitor, simulate
 from lathe_chatter.stability import rightmost_root

@@ -61,7 +61,7 @@ class Verification:
         """Whether nothing is missing or damaged."""
         return not any(finding.loss for finding in self.findings)
 
-    def lose(self, text: str) -> None:
+    def add_loss(self, text: str) -> None:
         """Something is missing or damaged."""
         self.findings.append(Finding(loss=True, text=text))
 

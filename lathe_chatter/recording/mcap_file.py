@@ -20,8 +20,8 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 
+from lathe_chatter.recording.chunk_index import Span, spans_of
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
-from lathe_chatter.recording.chunk_spans import Span, spans_of
 from lathe_chatter.recording.mcap_reader import (
     Chunk,
     ChunkHead,
@@ -383,7 +383,7 @@ def _check_attachment(content: bytes) -> None:
         raise _BadCrcError('does not have its CRC')
 
 
-def offers_of(channel: Any) -> list[dict[str, Any]]:
+def offered_qos(channel: Any) -> list[dict[str, Any]]:
     """The profiles that the publishers of a channel offered, as rosbag2 writes them."""
     try:
         offers = yaml.safe_load(channel.metadata.get('offered_qos_profiles', ''))

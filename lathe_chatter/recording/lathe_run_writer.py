@@ -25,7 +25,7 @@ from lathe_chatter.recording.ros_messages import (
     parameters_bytes,
     topic_of_type,
 )
-from lathe_chatter.recording.run_log import RunLog
+from lathe_chatter.recording.run_events import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.stability.krylov import dominant_eigenvalue
+from lathe_chatter.stability.dominant_eigenvalue import dominant_eigenvalue
 
 
 def start_of(size: int) -> Array:

@@ -10,10 +10,10 @@ import numpy as np
 from lathe_chatter.arrays import Integers
 from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.export import Exported, ExportedParts, Progress
+from lathe_chatter.recording.mcap_file import Raw, offered_qos
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.run_file import Raw, offers_of
 from lathe_chatter.recording.run_timeline import Timeline, read_timeline
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Selection
@@ -78,7 +78,7 @@ def _write(writer: RunWriter, stamp: int, raw: Raw) -> None:
         raw.type,
         bytes(raw.schema.data).decode(),
         raw.channel.metadata.get('topic_type_hash', ''),
-        tuple(offers_of(raw.channel)),
+        tuple(offered_qos(raw.channel)),
     )
     writer.add_topic(kind)
     writer.write(raw.topic, raw.data, log_time=stamp, publish_time=stamp, sequence=raw.sequence)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.model import Machine
-from lathe_chatter.paper.findings import (
+from lathe_chatter.paper.open_questions import (
     clearance_effect,
     coefficient_range,
     figure_window,

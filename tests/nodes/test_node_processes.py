@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from lathe_chatter.errors import NodeFailedError
-from lathe_chatter.nodes import process_group
-from lathe_chatter.nodes.process_group import ProcessGroup
+from lathe_chatter.nodes import node_processes
+from lathe_chatter.nodes.node_processes import ProcessGroup
 
 
 def module(folder: Path, monkeypatch: pytest.MonkeyPatch, program: str) -> str:
@@ -63,7 +63,7 @@ def test_a_node_that_is_killed_is_named_with_the_signal(
 def test_a_node_that_does_not_end_is_killed_and_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(process_group, '_END_TIMEOUT', 1.0)
+    monkeypatch.setattr(node_processes, '_END_TIMEOUT', 1.0)
     ready = tmp_path / 'ready'
     program = (
         'import pathlib, signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); '

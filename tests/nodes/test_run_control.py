@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lathe_chatter.nodes.control import RunControl, RunState
+from lathe_chatter.nodes.run_control import RunControl, RunState
 
 
 def test_it_begins_running() -> None:

@@ -7,39 +7,39 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from lathe_chatter.recording.counts_on_disk import FILE_NAME as UNFINISHED
+from lathe_chatter.recording.counts_on_disk import taken
+from lathe_chatter.recording.mcap_file import Note
 from lathe_chatter.recording.metadata import FILE_NAME
 from lathe_chatter.recording.provenance import ENDED_EARLY, IDENTITY, RECOVERED
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.run_file import Note
 from lathe_chatter.recording.split_files import CLOSED
-from lathe_chatter.recording.unfinished_counts import FILE_NAME as UNFINISHED
-from lathe_chatter.recording.unfinished_counts import taken
-from lathe_chatter.recording.verification import Verification
+from lathe_chatter.recording.verification_result import Verification
 
 
 def check_files(found: Verification) -> None:
     """Every file to its last byte, and that none is missing."""
     for damage in found.run.damage:
-        found.lose(str(damage))
+        found.add_loss(str(damage))
     for file in found.run.opened:
         name = file.path.name
         if not file.has_end:
-            found.lose(f'{name} has no sound summary: readers that need one refuse it.')
+            found.add_loss(f'{name} has no sound summary: readers that need one refuse it.')
             continue
         proof = file.prove()
         if proof is False:
-            found.lose(f'{name} is not, byte for byte, what was written.')
+            found.add_loss(f'{name} is not, byte for byte, what was written.')
         elif proof is None:
             what = 'any of it' if file.unproven else 'what stands outside of its chunks'
             found.remark(
                 f'{name} has no CRC of its data: whether {what} was altered cannot be told.'
             )
         for text in file.contradictions():
-            found.lose(f'{name}: {text}.')
+            found.add_loss(f'{name}: {text}.')
     folder = found.run.folder
     if folder is not None:
         if folder.metadata is None:
-            found.lose(f'{found.run.path / FILE_NAME} is missing or damaged.')
+            found.add_loss(f'{found.run.path / FILE_NAME} is missing or damaged.')
         for name in folder.strangers:
             found.remark(f'{name} is in the folder, and of another run: it was not looked at.')
 
@@ -49,16 +49,16 @@ def check_end(found: Verification, notes: list[Note]) -> None:
     end = max((count.last for count in found.samples.values()), default=math.nan)
     for text in lost_at_the_end(found.run, found.messages, found.last, end):
         found.finished = False
-        found.lose(text)
+        found.add_loss(text)
     for note in notes:
         if note.name == ENDED_EARLY:
-            found.lose(f'The run ended early. {note.values.get("reason", "")}'.strip())
+            found.add_loss(f'The run ended early. {note.values.get("reason", "")}'.strip())
         if note.name == RECOVERED:
             lost = noted(note, 'damage') or ()
             said = f'This run was recovered from {note.values.get("from", "another")}.'
-            (found.lose if lost else found.remark)(said)
+            (found.add_loss if lost else found.remark)(said)
             for text in lost:
-                found.lose(f'Before the recovery: {text}')
+                found.add_loss(f'Before the recovery: {text}')
 
 
 def lost_at_the_end(
@@ -110,10 +110,10 @@ def check_order(found: Verification) -> None:
         if not nexts or nexts[-1] == name or nexts[-1] in found.missing:
             continue
         if nexts[-1] and not following:
-            found.lose(f'{nexts[-1]} is missing, in which the run went on.')
+            found.add_loss(f'{nexts[-1]} is missing, in which the run went on.')
         else:
             goes_on = f'goes on in {nexts[-1]}' if nexts[-1] else 'is the last'
-            found.lose(f'{path.name} {goes_on}, and here {name} follows: names were changed.')
+            found.add_loss(f'{path.name} {goes_on}, and here {name} follows: names were changed.')
 
 
 def noted(note: Note, name: str) -> Any:

@@ -16,7 +16,7 @@ from lathe_chatter.model import BearingContact, Machine
 from lathe_chatter.paper.figures import WINDOWS
 from lathe_chatter.paper.reproduction import SAMPLE_RATE, paper_lathe
 from lathe_chatter.paper.runs import AXES, PAPER_RUNS, run_named
-from lathe_chatter.paper.screening import (
+from lathe_chatter.paper.screening_function import (
     ScreeningReading,
     axes_without_bearing,
     screening_readings,

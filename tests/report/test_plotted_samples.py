@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.report.run_samples import RunSamples
+from lathe_chatter.report.plotted_samples import RunSamples
 
 RATE = 1000.0
 
