@@ -37,6 +37,10 @@ setup(
     extras_require={
         'identify': ['pyuff', 'sdypy-EMA'],  # universal files, and first poles of a tap test
         'export': ['pyarrow', 'h5py', 'pandas', 'xarray'],
+        # The forms of a data set, one of which will do; Zarr 3 needs Python 3.11.
+        'dataset': ['pyarrow', 'h5py', 'zarr>=3; python_version >= "3.11"'],
+        'cluster': ['distributed'],  # Dask: more machines than one
+        'gymnasium': ['gymnasium'],  # a lathe to be learnt
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),

@@ -5,11 +5,26 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 
 class LatheChatterError(Exception):
     """Base of every error that the package raises on purpose; its text is for people."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As another process gets it: whatever it was made from, with its text and its facts."""
+        return _remade, (type(self), self.args, self.__dict__)
+
+
+def _remade(
+    kind: type[LatheChatterError], args: tuple[Any, ...], facts: dict[str, Any]
+) -> LatheChatterError:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(facts)
+    return error
 
 
 class ParameterError(LatheChatterError, ValueError):
@@ -48,8 +63,8 @@ class MachineFileError(LatheChatterError, ValueError):
     """A machine file that cannot be used: with its line, and what is allowed there."""
 
 
-class KnockMapError(LatheChatterError):
-    """A file that is no map of knocks, or not the one wanted."""
+class ResultFileError(LatheChatterError):
+    """A file of results, as of a map of knocks, that is none, or not the one wanted."""
 
 
 class RunReadError(LatheChatterError):
@@ -95,6 +110,22 @@ class MissingPackageError(LatheChatterError):
     def __init__(self, name: str, use: str) -> None:
         """Name the library and what for."""
         super().__init__(f'{use} needs {name}, which is not installed: `pip install {name}`.')
+
+
+def optional(name: str, use: str) -> Any:
+    """A library that not everybody has.
+
+    Raises:
+        MissingPackageError: If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise MissingPackageError(name, use) from None
+
+
+class WorkerError(LatheChatterError):
+    """Workers that are lost, or that have another version; the text says which."""
 
 
 class FrequencyResponseError(LatheChatterError, ValueError):

@@ -22,7 +22,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'lathe_chatter'
 LONGEST = 400
 
-BASE = {'arrays', 'compiled', 'errors', 'html_table', 'plot_style'}
+BASE = {
+    *('arrays', 'code_identity', 'compiled', 'errors', 'executors', 'html_table', 'plot_style'),
+    'result_file',
+}
 """What everybody may use: they use nothing but each other."""
 ARROWS = {
     'model': set(),

@@ -1,6 +1,7 @@
 """The figures of the chatter detector: how late, how often wrong, what it knows, what it costs.
 
     python benchmarks/detection [--quick] [--hours H] [--onsets N] [--plot FILE] [PART ...]
+        [--workers N] [--cluster ADDRESS]
 
 Parts: check onsets benign limit advice cpu (all by default). Thresholds of the rivals, and the
 detector's own, belong to one set of seeds (calibration); what is printed is from another.
@@ -26,6 +27,9 @@ from benign import advice, benign, check, cpu, limit
 from onsets import onsets
 from scenarios import NOISES
 
+from lathe_chatter.cli.console import Screen
+from lathe_chatter.cli.executor_options import add_executor, executor_of
+
 PARTS: dict[str, Callable[[Any], list[str]]] = {
     'check': check,
     'onsets': onsets,
@@ -48,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--scenarios', nargs='+', default=sorted(NOISES), choices=sorted(NOISES))
     parser.add_argument('--hours', type=float, metavar='H', help='of stable cutting (10.5)')
     parser.add_argument('--onsets', type=int, metavar='N', help='and events of a kind (240; 200)')
-    parser.add_argument('--processes', type=int, default=os.cpu_count())
+    add_executor(parser, 'a process a core')
     parser.add_argument('--plot', metavar='FILE', help='draw delay against false-alarm rate')
     parser.add_argument('--json', action='store_true', help='print JSON')
     options = parser.parse_args(arguments)
@@ -57,10 +61,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f'{unknown[0]} is no part: it must be one of {", ".join(PARTS)}')
     begin = time.monotonic()
     found: dict[str, list[str]] = {}
-    for part in options.parts or PARTS:
-        found[part] = PARTS[part](options)
-        if not options.json:
-            print('\n'.join(found[part]), flush=True)
+    if options.cluster is None:
+        options.workers = options.workers or os.cpu_count()
+    with executor_of(options, Screen(json=options.json)) as options.executor:
+        for part in options.parts or PARTS:
+            found[part] = PARTS[part](options)
+            if not options.json:
+                print('\n'.join(found[part]), flush=True)
     machine = f'{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}'
     if options.json:
         print(json.dumps(found, indent=2))

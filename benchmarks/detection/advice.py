@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import sys
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from simulator import COLUMNS, Stretch, Surroundings, simulate
 
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.speed_advice import rule_of_thumb
+from lathe_chatter.executors import spread
 from lathe_chatter.model import Machine
 from lathe_chatter.stability import critical_depth, rightmost_root, rightmost_roots
 
@@ -95,11 +96,10 @@ def _rule_figures(trials: list[Trial]) -> str:
     return f'60 f/k, random machines: stable in {held} of {tried} = {100.0 * held / tried:.0f} %'
 
 
-def advice_figures(random: int, processes: int) -> list[str]:
+def advice_figures(random: int, executor: Executor) -> list[str]:
     """Both tables."""
     trials = _trials(random)
-    with multiprocessing.Pool(processes) as pool:
-        outcomes = pool.map(judge, trials, chunksize=2)
+    outcomes = spread(judge, trials, executor=executor, batch=2)
     lines = []
     for label, found in (
         ('8 machine states', outcomes[:8]),

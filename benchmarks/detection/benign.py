@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import time
 from collections.abc import Callable
 from statistics import median
@@ -20,6 +19,7 @@ from simulator import COLUMNS, RATE, Stretch, Surroundings, simulate
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.executors import spread
 from lathe_chatter.stability import rightmost_root
 
 
@@ -49,7 +49,7 @@ def benign(options: Any) -> list[str]:
     calm = run(
         [scenarios.stable('S1', CALIBRATION + k) for k in range(max(4, minutes))],
         'S1 stable',
-        options.processes,
+        options.executor,
     )
     limits = {name: threshold_for(calm, name, ASKED) for name in RIVALS} | {DETECTOR: 1.0}
     kinds: dict[str, tuple[Callable[[int], Case], int]] = {
@@ -63,7 +63,7 @@ def benign(options: Any) -> list[str]:
         'contact changes, stable both ways': (scenarios.contact, number // 4 + 1),
     }
     for label, (make, repeats) in kinds.items():
-        found = run([make(k) for k in range(repeats)], label, options.processes)
+        found = run([make(k) for k in range(repeats)], label, options.executor)
         events = sum(len(traces.case.events) for traces in found)
         shares = []
         for name, threshold in limits.items():
@@ -101,8 +101,7 @@ def limit_cycle(case: Case) -> float:
 def limit(options: Any) -> list[str]:
     """The monitor started late."""
     cases = [scenarios.saturated(k) for k in range(4 if options.quick else 40)]
-    with multiprocessing.Pool(options.processes) as pool:
-        found = np.array(pool.map(limit_cycle, cases, chunksize=2))
+    found = np.array(spread(limit_cycle, cases, executor=options.executor, batch=2))
     half, most = quantiles(found)
     said = f'said after {1e3 * half:.0f} / {1e3 * most:.0f} ms, {int(np.isinf(found).sum())} not'
     return [f'switched on in saturated chatter: {len(cases)} cases, {said}']
@@ -110,7 +109,7 @@ def limit(options: Any) -> list[str]:
 
 def advice(options: Any) -> list[str]:
     """Recommended speeds."""
-    return advice_figures(16 if options.quick else 200, options.processes)
+    return advice_figures(16 if options.quick else 200, options.executor)
 
 
 def _spent(samples: Array, size: int) -> float:

@@ -55,7 +55,7 @@ def onsets(options: Any) -> list[str]:
         )
         calm = {
             name: run(
-                [make(noise, seed + k) for k in range(n)], f'{noise} stable', options.processes
+                [make(noise, seed + k) for k in range(n)], f'{noise} stable', options.executor
             )
             for name, seed, n in (
                 ('calibration', CALIBRATION, max(4, watched // 4)),
@@ -65,7 +65,7 @@ def onsets(options: Any) -> list[str]:
         shaken = run(
             [scenarios.onset(noise, REPORTED + k) for k in range(count)],
             f'{noise} onsets',
-            options.processes,
+            options.executor,
         )
         lines += [
             f'{noise}: {count} onsets, {rate(calm["reported"], DETECTOR, 1.0)[1]:.2f} h stable'

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from simulator import COLUMNS, RATE, simulate
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.executors import spread
 
 DETECTOR = 'this detector'
 
@@ -71,15 +72,14 @@ def _told(samples: Array) -> list[Estimate]:
     return [detector.update(samples[start : start + HOP], COLUMNS) for start in starts]
 
 
-def run(cases: Sequence[Case], label: str, processes: int) -> list[Traces]:
-    """Record all cases on all cores."""
-    with (
-        multiprocessing.Pool(processes) as pool,
-        Progress(transient=True, disable=not sys.stderr.isatty()) as progress,
-    ):
+def run(cases: Sequence[Case], label: str, executor: Executor) -> list[Traces]:
+    """Record all cases wherever there are workers."""
+    with Progress(transient=True, disable=not sys.stderr.isatty()) as progress:
         bar = progress.add_task(label, total=len(cases))
-        found = []
-        for traces in pool.imap_unordered(record, cases, chunksize=2):
-            found.append(traces)
-            progress.advance(bar)
-    return sorted(found, key=lambda traces: traces.case.seed)
+        return spread(
+            record,
+            cases,
+            executor=executor,
+            batch=2,
+            progress=lambda count: progress.advance(bar, count),
+        )

@@ -10,6 +10,7 @@ import numpy as np
 
 from lathe_chatter.cli.common_options import add_force, add_json
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
+from lathe_chatter.cli.executor_options import add_executor, executor_of
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
@@ -54,6 +55,7 @@ def configure(parser: ArgumentParser) -> None:
         '--tolerance', type=float, default=0.01, metavar='X',
         help='relative width to which the smallest is bracketed (default: %(default)g)',
     )  # fmt: skip
+    add_executor(parser)
     add_force(parser)
     add_json(parser)
     add_parameter_options(
@@ -85,8 +87,8 @@ def run(options: Namespace) -> int:
     screen = Screen(json=options.json)
     screen.compile()
     try:
-        with screen.progress('points') as bar:
-            knocks = run_knock_map(grid, options.output, bar.show)
+        with executor_of(options, screen) as executor, screen.progress('points') as bar:
+            knocks = run_knock_map(grid, options.output, bar.show, executor=executor)
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {options.output}.')
         return INTERRUPTED

@@ -5,14 +5,20 @@ from __future__ import annotations
 import csv
 import math
 from argparse import ArgumentParser, Namespace
+from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.cli.common_options import add_force, add_json, picture_file
-from lathe_chatter.cli.console import Screen, keep_existing, writing
+from lathe_chatter.cli.common_options import (
+    add_force,
+    add_json,
+    picture_file,
+)
+from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
+from lathe_chatter.cli.executor_options import add_executor, executor_of
 from lathe_chatter.cli.parameter_options import (
     add_parameter_options,
     config_of,
@@ -42,7 +48,7 @@ _HEADROOM = 2.6
 _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
-_PROBABLE_SPEEDS = 200
+_PROBABLE_SPEEDS, _PROBABLE_MACHINES = 200, 1000
 _WORTH_A_WORD = 0.05
 """Share of the variance below which a figure is not named."""
 _SHALLOWEST = 1000.0
@@ -79,6 +85,7 @@ def configure(parser: ArgumentParser) -> None:
         help='picture to write: .png with an .svg beside it, .svg or .pdf (default: %(default)s)',
     )  # fmt: skip
     parser.add_argument('--csv', type=Path, metavar='FILE', help='write the limits as CSV too')
+    add_executor(parser)
     add_force(parser)
     add_json(parser)
     add_parameter_options(
@@ -106,18 +113,26 @@ def run(options: Namespace) -> int:
     top = _top(limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
     screen = Screen(json=options.json)
-    growth = None
-    if options.map or config.cut.speed_variation_amplitude > 0.0:
-        growth = _map(config, low, high, top, SpeedLaw(options.law), screen)
-    probability = None
-    if growth is None:
-        probability = _probability(options, config, low, high, screen)
+    kept = options.output.with_suffix('.jsonl')
+    growth, probability = None, None
+    try:
+        with executor_of(options, screen) as executor:
+            wide = _Wide(screen, executor, kept)
+            if options.map or config.cut.speed_variation_amplitude > 0.0:
+                growth = _map(config, low, high, top, SpeedLaw(options.law), wide)
+            else:
+                probability = _probability(options, config, low, high, wide)
+    except KeyboardInterrupt:
+        screen.say(f'Interrupted: the same call goes on from {kept}.')
+        return INTERRUPTED
     with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
         draw_lobes(config.cut, limits, growth, top, options.output, probability=probability)
     if options.csv is not None:
         with writing(options.csv):
             _write_csv(options.csv, config, limits)
+    if growth is not None or probability is not None:
+        kept.unlink(missing_ok=True)
     _show(config, limits, screen)
     if probability is not None:
         _show_probability(config, probability, screen)
@@ -144,12 +159,20 @@ def _top(limits: SafeLimit) -> float:
     return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
 
 
-def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where that is told
-    config: LatheConfig, low: float, high: float, top: float, law: SpeedLaw, screen: Screen
+class _Wide(NamedTuple):
+    """Where wide work is told of, done and kept until the picture is there."""
+
+    screen: Screen
+    executor: Executor
+    kept: Path
+
+
+def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where
+    config: LatheConfig, low: float, high: float, top: float, law: SpeedLaw, wide: _Wide
 ) -> GrowthMap:
     """The growth rates over the chart."""
     columns, rows = _VARIED_MAP if config.cut.speed_variation_amplitude > 0.0 else _MAP
-    with screen.progress('growth rates', columns * rows) as bar:
+    with wide.screen.progress('growth rates', columns * rows) as bar:
         return growth_map(
             config.machine,
             config.cut,
@@ -157,12 +180,14 @@ def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where that is told
             np.linspace(top / _SHALLOWEST, top, rows),
             tool_leaves_cut=config.setup.tool_leaves_cut,
             law=law,
+            executor=wide.executor,
+            kept_in=wide.kept,
             progress=bar.advance,
         )
 
 
 def _probability(
-    options: Namespace, config: LatheConfig, low: float, high: float, screen: Screen
+    options: Namespace, config: LatheConfig, low: float, high: float, wide: _Wide
 ) -> StabilityProbability | None:
     """Of a machine that is known with errors, None where nothing is said of any."""
     known = None
@@ -172,13 +197,17 @@ def _probability(
         known = described.uncertainty
     if not known:
         return None
-    with screen.working('Drawing machines as the truth may be ...'):
+    with wide.screen.progress('machines as the truth may be', _PROBABLE_MACHINES) as bar:
         return stability_probability(
             config.machine,
             known,
             config.cut,
             chart_speeds(low, high, _PROBABLE_SPEEDS),
+            machines=_PROBABLE_MACHINES,
             tool_leaves_cut=config.setup.tool_leaves_cut,
+            executor=wide.executor,
+            kept_in=wide.kept,
+            progress=bar.advance,
         )
 
 

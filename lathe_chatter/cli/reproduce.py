@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
-import signal
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -17,6 +14,7 @@ from typing import Any
 from lathe_chatter.cli.common_options import add_force, add_json
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, plain, writing
 from lathe_chatter.errors import OutputError
+from lathe_chatter.executors import Processes
 from lathe_chatter.paper import PAPER_RUNS, Findings, Reproduced, find, reproduce_run
 from lathe_chatter.paper.figures import Picture, draw_paper_picture, paper_pictures
 from lathe_chatter.paper.page import OVERVIEWS, PAGE, write_page
@@ -88,8 +86,7 @@ def _work(
             bar.advance()
 
         def draw(work: Callable[..., None], *arguments: Any) -> None:
-            with _interrupts_held_back():
-                future = pool.submit(work, *arguments)
+            future = pool.submit(work, *arguments)
             future.add_done_callback(step)
             drawn.append(future)
 
@@ -111,37 +108,20 @@ def _work(
 
 
 @contextmanager
-def _workers() -> Iterator[ProcessPoolExecutor]:
+def _workers() -> Iterator[Processes]:
     """Processes that draw; when something goes wrong here they begin nothing more.
 
     Raises:
-        OutputError: If one was killed.
+        OutputError: If they are killed again and again.
     """
-    # Not forked: threads of a library that has begun to compute do not survive that.
-    pool = ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context('spawn'))
     try:
-        with pool:
-            try:
-                yield pool
-            except BaseException:
-                for process in multiprocessing.active_children():
-                    process.terminate()
-                raise
+        with Processes() as pool:
+            yield pool
     except BrokenExecutor:
         raise OutputError(
-            'A process that draws was killed, perhaps for want of memory: --no-pictures does '
+            'Processes that draw were killed, perhaps for want of memory: --no-pictures does '
             'without.'
         ) from None
-
-
-@contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Start processes that Ctrl-C does not reach: this one ends them."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def figures_of(results: list[Reproduced], findings: Findings) -> dict[str, Any]:

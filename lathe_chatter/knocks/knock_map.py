@@ -1,25 +1,23 @@
-"""Maps of the smallest lasting knock: computed on every core, kept in a file, continued.
-
-The file is text, a JSON object in each line: first what the map is of, then a line for each
-point as it is found. A run that is interrupted loses the points in progress and nothing else.
-"""
+"""Maps of the smallest lasting knock: computed by every worker, kept in a file, continued."""
 
 from __future__ import annotations
 
 import itertools
 import json
 import math
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lathe_chatter.errors import KnockMapError
+from lathe_chatter.errors import ResultFileError
+from lathe_chatter.executors import run_batches
 from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
+from lathe_chatter.result_file import ResultFile
 
 _KIND = 'lathe_chatter knock map 1'
 
@@ -103,26 +101,27 @@ def read_knock_map(path: Path) -> KnockMap:
     """Read a map; a last line that was cut off is passed over.
 
     Raises:
-        KnockMapError: If the file is none.
+        ResultFileError: If the file is none.
     """
     try:
         header, *entries = [json.loads(line) for line in path.read_bytes().split(b'\n')[:-1]]
-        grid = _grid(header)
-        limits = {}
-        for entry in entries:
-            point = Point(*(entry.pop(name) for name in Point._fields))
-            impulse = entry.pop('impulse')
-            limits[point] = KnockLimit(
-                Margin(entry.pop('margin')),
-                math.nan if impulse is None else impulse,
-                amplitude=_number(entry.pop('amplitude')),
-                **entry,
-            )
+        grid, limits = _grid(header), _limits(entries)
     except OSError as error:
-        raise KnockMapError(f'{path} cannot be read: {error.strerror}.') from None
+        raise ResultFileError(f'{path} cannot be read: {error.strerror}.') from None
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise KnockMapError(f'{path} is no map of knocks.') from None
+        raise ResultFileError(f'{path} is no map of knocks.') from None
     return KnockMap(grid, limits)
+
+
+def _limits(entries: Iterable[dict[str, Any]]) -> dict[Point, KnockLimit]:
+    """The points of a map from its lines."""
+    limits = {}
+    for entry in entries:
+        point = Point(*(entry[name] for name in Point._fields))
+        names = ('impulse', 'survived', 'linear', 'searched', 'amplitude')
+        values = {name: _number(entry[name]) for name in names}
+        limits[point] = KnockLimit(Margin(entry['margin']), trials=entry['trials'], **values)
+    return limits
 
 
 def _grid(header: dict[str, Any]) -> KnockGrid:
@@ -142,6 +141,8 @@ def run_knock_map(
     grid: KnockGrid,
     path: Path,
     tell: Callable[[int, int], None] = lambda _done, _total: None,
+    *,
+    executor: Executor | None = None,
 ) -> KnockMap:
     """Compute a map into a file, or what is still missing of it.
 
@@ -149,57 +150,25 @@ def run_knock_map(
         grid: What is wanted.
         path: Of the file; one that exists must be of the same grid, and is continued.
         tell: Is told how many points of how many are there.
+        executor: Where it is computed, see `executors`; by default threads, one a core.
 
     Raises:
-        KnockMapError: If the file is of something else or cannot be written.
+        ResultFileError: If the file is of something else or cannot be written.
+        WorkerError: If workers are lost, or have another version.
     """
-    try:
-        done = _open(grid, path)
-        wanted = [point for point in grid.points() if point not in done]
-        tell(len(done), len(done) + len(wanted))
-        with path.open('ab') as file:
-            for point, limit in _computed(grid, wanted):
-                done[point] = limit
-                file.write(_line(point._asdict() | _values(limit)))
-                file.flush()
-                tell(len(done), len(list(grid.points())))
-    except OSError as error:
-        raise KnockMapError(f'{path} cannot be written: {error.strerror}.') from None
+    points = list(grid.points())
+    file = ResultFile(path, grid.header())
+    with closing(file):
+        done = _limits(file.entries)
+        wanted = [point for point in points if point not in done]
+        tell(len(done), len(points))
+        # One by one: a point may take seconds, and an interruption loses those in progress.
+        for found in run_batches(grid.limit_at, [[point] for point in wanted], executor=executor):
+            point, (limit,) = wanted[found.place], found.results
+            done[point] = limit
+            file.add(point._asdict() | _values(limit))
+            tell(len(done), len(points))
     return KnockMap(grid, done)
-
-
-def _open(grid: KnockGrid, path: Path) -> dict[Point, KnockLimit]:
-    """What the file holds already; a new one gets its first line."""
-    whole = path.read_bytes() if path.exists() else b''
-    whole = whole[: whole.rfind(b'\n') + 1]
-    if not whole:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(_line(grid.header()))
-        return {}
-    known = read_knock_map(path)
-    if known.grid != grid:
-        raise KnockMapError(f'{path} holds another map: give another file, or remove it.')
-    with path.open('r+b') as file:
-        file.truncate(len(whole))
-    return known.limits
-
-
-def _computed(grid: KnockGrid, points: list[Point]) -> Iterator[tuple[Point, KnockLimit]]:
-    """The points as they are found. The inner loop lets other threads run."""
-    waiting = iter(points)
-    cores = os.cpu_count() or 1
-    with ThreadPoolExecutor(cores) as pool:
-        running: dict[Future[KnockLimit], Point] = {}
-        # No more are begun than fit, so that an interruption waits for those alone.
-        for point in itertools.islice(waiting, cores):
-            running[pool.submit(grid.limit_at, point)] = point
-        while running:
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in finished:
-                point = running.pop(future)
-                for following in itertools.islice(waiting, 1):
-                    running[pool.submit(grid.limit_at, following)] = following
-                yield point, future.result()
 
 
 def _values(limit: KnockLimit) -> dict[str, Any]:
@@ -213,7 +182,3 @@ def _values(limit: KnockLimit) -> dict[str, Any]:
 
 def _number(value: Any) -> float:
     return math.nan if value is None else float(value)
-
-
-def _line(values: dict[str, Any]) -> bytes:
-    return json.dumps(values).encode() + b'\n'

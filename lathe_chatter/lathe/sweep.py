@@ -1,15 +1,17 @@
-"""`LatheSweep`: many virtual lathes in one call, on all cores, each as if it were alone."""
+"""`LatheSweep`: many virtual lathes in one call, on all workers, each as if it were alone."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.executors import spread
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut
 from lathe_chatter.model.quantities import count_of
@@ -23,7 +25,7 @@ class LatheSweep:
     """Lathes that cut on together: other speeds, depths, clearances, machines or seeds.
 
     Each is a `VirtualLathe` of its own, so every sample is bit for bit the one that it gives
-    alone; the threads of a call share the lathes among them.
+    alone; the workers of a call share the lathes among them.
 
         cuts = [Cut(speed, 1e-3) for speed in np.linspace(2000.0, 6000.0, 200)]
         sweep = LatheSweep(VirtualLathe(cut=cut) for cut in cuts)
@@ -43,21 +45,26 @@ class LatheSweep:
         if not given or wrong is not None:
             value = 'empty' if wrong is None else wrong
             raise ParameterError('lathes', value, '', 'at least one VirtualLathe, and no others')
-        self._lathes = [VirtualLathe.continued(lathe.snapshot()) for lathe in given]
-        self._last = [_present(lathe) for lathe in given]
+        self._lathes = [
+            _Lathe(VirtualLathe.continued(lathe.snapshot()), _present(lathe)) for lathe in given
+        ]
 
     def __len__(self) -> int:
         return len(self._lathes)
 
     def advance(
-        self, samples: int, *, columns: Sequence[str] = SAMPLE_COLUMNS, workers: int | None = None
+        self,
+        samples: int,
+        *,
+        columns: Sequence[str] = SAMPLE_COLUMNS,
+        executor: Executor | None = None,
     ) -> Array:
         """Cut on with all lathes.
 
         Args:
             samples: How many of each, 0 or more.
             columns: Which of `samples.SAMPLE_COLUMNS` are wanted, in this order.
-            workers: Threads; by default as many as this process may use cores.
+            executor: Where the lathes cut, see `executors`; by default threads, one a core.
 
         Returns:
             The samples (samples, lathes, columns). A lathe that its guard has ended, see
@@ -65,44 +72,24 @@ class LatheSweep:
 
         Raises:
             ParameterError: If an argument is not allowed.
+            WorkerError: If workers are lost; then no lathe of theirs has cut on.
         """
         count_of('samples', samples)
-        if workers is not None:
-            count_of('workers', workers, least=1)
         for name in [columns] if isinstance(columns, str) else columns:
             if isinstance(columns, str) or name not in SAMPLE_COLUMNS:
                 raise ParameterError(
                     'columns', name, '', f'a list of some of {", ".join(SAMPLE_COLUMNS)}'
                 )
         wanted = [SAMPLE_COLUMNS.index(name) for name in columns]
+        cut_on = partial(_cut_on, samples=samples, wanted=wanted)
         out = np.empty((len(self), samples, len(wanted)))
-
-        def cut(place: int) -> None:
-            self._cut(place, out[place], wanted)
-
-        workers = min(workers or len(os.sched_getaffinity(0)), len(self))
-        if workers == 1:
-            for place in range(len(self)):
-                cut(place)
-        else:
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(cut, range(len(self))))
+        for place, (lathe, block) in enumerate(spread(cut_on, self._lathes, executor=executor)):
+            self._lathes[place], out[place] = lathe, block
         return out.transpose(1, 0, 2)
 
     def lathes(self) -> list[VirtualLathe]:
         """The lathes as they stand, each to be looked at, changed and continued by itself."""
-        return [VirtualLathe.continued(lathe.snapshot()) for lathe in self._lathes]
-
-    def _cut(self, place: int, out: Array, wanted: list[int]) -> None:
-        """Cut on with one lathe and write what is wanted of its samples (n, columns)."""
-        lathe, done = self._lathes[place], 0
-        while done < len(out) and not lathe.guard:
-            block = lathe.advance(min(_BLOCK, len(out) - done))
-            out[done : done + len(block)] = block[:, wanted]
-            done += len(block)
-            if len(block):
-                self._last[place] = block[-1].copy()
-        out[done:] = self._last[place][wanted]
+        return [VirtualLathe.continued(each.lathe.snapshot()) for each in self._lathes]
 
 
 def sample_rate_for(cut: Cut, samples_per_turn: int) -> float:
@@ -118,3 +105,24 @@ def sample_rate_for(cut: Cut, samples_per_turn: int) -> float:
 def _present(lathe: VirtualLathe) -> Array:
     """What a lathe that ends before its next sample stands still at (8,)."""
     return np.array([lathe.time, lathe.spindle_angle, *lathe.snapshot().motion(), 0.0, 0.0])
+
+
+class _Lathe(NamedTuple):
+    """A lathe, and the sample (8,) that is repeated once its guard has ended it."""
+
+    lathe: VirtualLathe
+    last: Array
+
+
+def _cut_on(one: _Lathe, samples: int, wanted: list[int]) -> tuple[_Lathe, Array]:
+    """Cut on with one lathe: it, and what is wanted of its samples (n, columns)."""
+    lathe, last, done = one.lathe, one.last, 0
+    out = np.empty((samples, len(wanted)))
+    while done < samples and not lathe.guard:
+        block = lathe.advance(min(_BLOCK, samples - done))
+        out[done : done + len(block)] = block[:, wanted]
+        done += len(block)
+        if len(block):
+            last = block[-1].copy()
+    out[done:] = last[wanted]
+    return _Lathe(lathe, last), out

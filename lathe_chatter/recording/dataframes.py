@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
-from lathe_chatter.errors import MissingPackageError
+from lathe_chatter.errors import optional
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Samples
 from lathe_chatter.samples.columns import UNITS
-
-
-def optional(name: str, use: str) -> Any:
-    """A library that not everybody has.
-
-    Raises:
-        MissingPackageError: If it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError:
-        raise MissingPackageError(name, use) from None
 
 
 def to_pandas(samples: Samples) -> Any:

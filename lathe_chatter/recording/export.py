@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError
-from lathe_chatter.recording.dataframes import optional
+from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError, optional
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_reader import TIME
 from lathe_chatter.recording.sample_series import Selection

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.result_file import spread_into
 from lathe_chatter.stability.characteristic import ProcessDamping, checked
 from lathe_chatter.stability.periodic_map import SpeedLaw
 from lathe_chatter.stability.roots import rightmost_roots
@@ -45,6 +49,8 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     *,
     tool_leaves_cut: bool = True,
     law: SpeedLaw = SpeedLaw.SPEED,
+    executor: Executor | None = None,
+    kept_in: Path | None = None,
     progress: Callable[[int], object] = lambda _count: None,
 ) -> GrowthMap:
     """The growth rate at every speed and depth, at the clearance and feed speed of a cut.
@@ -57,26 +63,43 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
         depth_of_cut: Depths (m,), m.
         tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
         law: What swings where the speed is varied.
+        executor: Where it is computed, see `executors`; by default threads, one a core.
+        kept_in: File that keeps what is computed, and is continued where it exists.
         progress: Is told, now and then, how many more points are known.
 
     Raises:
         ParameterError: If a speed or depth is not allowed, or the answer would take minutes.
+        ResultFileError: If the file is of something else, or cannot be written.
     """
     speeds = np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
     depths = np.atleast_1d(checked('depth_of_cut', depth_of_cut))
     line = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut).seating_line
     rests: NDArray[np.bool_] = depths[:, None] >= line
-    growth = np.empty(rests.shape)
-    # A column at a time: so there is something to tell, and a varied speed shares its work.
-    for column, speed in enumerate(speeds.tolist()):
-        for seated in (False, True):
-            here = rests[:, column] == seated
-            if here.any():
-                growth[here, column] = _growth(
-                    machine, cut, speed, depths[here], law, seated=seated
-                )
-        progress(depths.size)
+    column = partial(_column, machine, cut, law, depths)
+    columns = spread_into(
+        kept_in,
+        {'growth rates': repr((machine, cut, law.value)), 'depths': depths.tolist()}
+        | {'speeds': speeds.tolist(), 'rests': rests.tolist()},
+        column,
+        list(zip(speeds.tolist(), rests.T.tolist(), strict=True)),
+        executor=executor,
+        progress=lambda count: progress(count * depths.size),
+    )
+    growth = np.array(columns, float).reshape(speeds.size, depths.size).T
     return GrowthMap(speeds, depths, growth, rests, law)
+
+
+def _column(
+    machine: Machine, cut: Cut, law: SpeedLaw, depths: Array, at: tuple[float, list[bool]]
+) -> list[float]:
+    """The growth rates at a speed: a varied one shares its work among the depths."""
+    speed, rests = at[0], np.array(at[1])
+    growth = np.empty(len(depths))
+    for seated in (False, True):
+        here = rests == seated
+        if here.any():
+            growth[here] = _growth(machine, cut, speed, depths[here], law, seated=seated)
+    return [float(rate) for rate in growth]
 
 
 def _growth(  # noqa: PLR0913 -- a column of a map

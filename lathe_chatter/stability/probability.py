@@ -7,7 +7,11 @@ that share is itself known to sqrt(p (1 - p)/n): with 1000 to 0.7 % where it is 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +20,7 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import Quantity, count_of
 from lathe_chatter.model.uncertainty import Uncertainty
+from lathe_chatter.result_file import spread_into
 from lathe_chatter.stability.characteristic import checked
 from lathe_chatter.stability.safe_limit import safe_limit
 
@@ -71,6 +76,9 @@ def stability_probability(  # noqa: PLR0913 -- what is cut, how sure that is, an
     machines: int = 1000,
     seed: int = 0,
     tool_leaves_cut: bool = True,
+    executor: Executor | None = None,
+    kept_in: Path | None = None,
+    progress: Callable[[int], object] = lambda _count: None,
 ) -> StabilityProbability:
     """Draw machines and find the safe limit of each.
 
@@ -82,17 +90,35 @@ def stability_probability(  # noqa: PLR0913 -- what is cut, how sure that is, an
         machines: How many are drawn.
         seed: Of the random numbers: the same seed draws the same machines.
         tool_leaves_cut: See `safe_limit`.
+        executor: Where it is computed, see `executors`; by default threads, one a core.
+        kept_in: File that keeps what is computed, and is continued where it exists.
+        progress: Is told, now and then, how many more machines are known.
 
     Raises:
         ParameterError: If a speed or a count is not allowed.
+        ResultFileError: If the file is of something else, or cannot be written.
     """
     speeds = np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
     drawn, deviations = uncertainty.draw(machine, count_of('machines', machines, least=1), seed)
-    each = np.array(drawn, object)[:, None]
-    limits = safe_limit(each, cut, speeds, tool_leaves_cut=tool_leaves_cut).depth_of_cut
+    found = spread_into(
+        kept_in,
+        {'limits of machines': repr((machine, cut, tool_leaves_cut)), 'machines': machines}
+        | {'seed': seed, 'speeds': speeds.tolist(), 'errors': uncertainty.covariance.tolist()},
+        partial(_limits_of, cut, speeds, tool_leaves_cut=tool_leaves_cut),
+        drawn,
+        executor=executor,
+        progress=progress,
+    )
+    limits = np.array(found)
     return StabilityProbability(
         speeds, np.sort(limits, axis=0), uncertainty.names, _shares(deviations, limits)
     )
+
+
+def _limits_of(cut: Cut, speeds: Array, machine: Machine, *, tool_leaves_cut: bool) -> list[float]:
+    """The safe depths of one machine (m,)."""
+    depths = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut).depth_of_cut
+    return [float(depth) for depth in depths]
 
 
 def _shares(deviations: Array, limits: Array) -> Array:

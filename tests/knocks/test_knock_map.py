@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lathe_chatter.errors import KnockMapError
+from lathe_chatter.errors import ResultFileError
 from lathe_chatter.knocks import KnockGrid, Margin, read_knock_map, run_knock_map
 from lathe_chatter.lathe.config import LatheConfig, config_from
 
@@ -55,7 +55,7 @@ def test_another_map_is_not_written_into(tmp_path: Path) -> None:
     other = KnockGrid(config_from({'feed_speed': 0.005}), (3000.0,), (0.1e-3,), (5e-6,))
     run_knock_map(other, path)
     before = path.read_bytes()
-    with pytest.raises(KnockMapError, match='another map'):
+    with pytest.raises(ResultFileError, match='another map'):
         run_knock_map(GRID, path)
     assert path.read_bytes() == before
     assert read_knock_map(path).grid == other
@@ -65,5 +65,5 @@ def test_another_map_is_not_written_into(tmp_path: Path) -> None:
 def test_what_is_no_map_is_said_to_be_none(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / 'other.txt'
     path.write_bytes(content)
-    with pytest.raises(KnockMapError, match='no map of knocks'):
+    with pytest.raises(ResultFileError, match='no map of knocks'):
         read_knock_map(path)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,6 +13,7 @@ import pytest
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.executors import Processes
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.sweep import LatheSweep, sample_rate_for
 from lathe_chatter.model import Cut
@@ -48,15 +53,16 @@ def _alone(lathes: list[VirtualLathe], samples: int) -> list[Array]:
     return [VirtualLathe.continued(lathe.snapshot()).advance(samples) for lathe in lathes]
 
 
-@pytest.mark.parametrize('workers', [1, 2])
-def test_each_lathe_cuts_as_it_does_alone(workers: int) -> None:
-    """Bit for bit, in whatever parts it is asked for."""
+@pytest.mark.parametrize('kind', [partial(ThreadPoolExecutor, 1), partial(Processes, 2), None])
+def test_each_lathe_cuts_as_it_does_alone(kind: Callable[[], Executor] | None) -> None:
+    """Bit for bit, in whatever parts it is asked for, and whoever does it."""
     lathes, total = _assorted(), 40 * _PER_TURN
     sweep = LatheSweep(lathes)
-    rng = np.random.default_rng(workers)
+    rng = np.random.default_rng(1)
     parts: list[Array] = []
-    while (left := total - sum(map(len, parts))) > 0:
-        parts.append(sweep.advance(min(left, int(rng.integers(0, 400))), workers=workers))
+    with kind() if kind else nullcontext() as executor:
+        while (left := total - sum(map(len, parts))) > 0:
+            parts.append(sweep.advance(min(left, int(rng.integers(0, 400))), executor=executor))
     samples = np.concatenate(parts)
     assert samples.shape == (total, len(lathes), len(SAMPLE_COLUMNS))
     assert np.isfinite(samples).all()
@@ -133,7 +139,6 @@ def test_many_events_and_a_growing_surface() -> None:
         (lambda: _sweep().advance(-1), 'samples'),
         (lambda: _sweep().advance(1.5), 'samples'),
         (lambda: _sweep().advance(1, columns=['tool_position']), 'tool_displacement'),
-        (lambda: _sweep().advance(1, workers=0), 'workers'),
     ],
 )
 def test_what_is_refused(call: Any, words: str) -> None:

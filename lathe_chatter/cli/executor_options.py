@@ -1,0 +1,70 @@
+"""Where work that is wide is done, as a user says it: `--workers 4`, `--cluster tcp://host:8786`."""
+
+from __future__ import annotations
+
+import warnings
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
+
+from lathe_chatter.cli.console import Screen
+from lathe_chatter.errors import ParameterError, optional
+from lathe_chatter.executors import RETRIES, Processes, cores
+from lathe_chatter.model.quantities import count_of
+
+_DASK_TIMEOUT = 10.0
+
+
+def add_executor(parser: ArgumentParser, usual: str = 'threads, one a core') -> None:
+    """Declare where work that is wide may be done."""
+    parser.add_argument(
+        '--workers', type=int, metavar='N',
+        help=f'processes of this machine that share the work (default: {usual})',
+    )  # fmt: skip
+    parser.add_argument(
+        '--cluster', metavar='ADDRESS',
+        help='Dask scheduler whose workers share the work, as tcp://host:8786; local starts one '
+        "with --workers workers (pip install 'lathe_chatter[cluster]')",
+    )  # fmt: skip
+
+
+@contextmanager
+def executor_of(options: Namespace, screen: Screen) -> Iterator[Executor]:
+    """Where the user wants wide work done; that processors differ is said.
+
+    Raises:
+        ParameterError: If there is no such place.
+        MissingPackageError: If Dask is asked for and not installed.
+    """
+    if options.workers is not None:
+        count_of('--workers', options.workers, least=1)
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: screen.say(str(message))
+        with open_executor(options.workers, options.cluster) as executor:
+            yield executor
+
+
+@contextmanager
+def open_executor(workers: int | None = None, cluster: str | None = None) -> Iterator[Executor]:
+    """Processes, or a Dask cluster (the address of its scheduler, or `local`), or else threads.
+
+    Raises:
+        ParameterError: If no scheduler answers there.
+        MissingPackageError: If Dask is asked for and not installed.
+    """
+    if cluster is None:
+        with Processes(workers) if workers else ThreadPoolExecutor(cores()) as pool:
+            yield pool
+        return
+    dask, local = optional('distributed', 'A cluster'), nullcontext(cluster)
+    if cluster == 'local':
+        local = dask.LocalCluster(workers or cores(), threads_per_worker=1, dashboard_address=None)
+    with local as address:
+        try:
+            client = dask.Client(address, timeout=_DASK_TIMEOUT)
+        except (OSError, ValueError, TypeError):
+            allowed = 'local, or the address of a Dask scheduler that answers: tcp://host:8786'
+            raise ParameterError('--cluster', cluster, '', allowed) from None
+        with client:
+            yield client.get_executor(retries=RETRIES)

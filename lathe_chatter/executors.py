@@ -1,0 +1,188 @@
+"""`executor=`: where wide work is done, which may be threads, processes or other machines.
+
+Any `concurrent.futures.Executor` will do: threads (where none is given), `Processes`, Dask's
+`Client.get_executor()`, mpi4py's MPIPoolExecutor. Work goes out in batches, and what comes back
+is put where it belongs: results do not depend on how many workers there are, of which kind, in
+which order they end, or whether one was lost.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import multiprocessing
+import os
+import platform
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent import futures
+from concurrent.futures import Executor, Future
+from contextlib import nullcontext
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
+
+from lathe_chatter.code_identity import code_identity, processor_name
+from lathe_chatter.errors import WorkerError
+
+Item = TypeVar('Item')
+Result = TypeVar('Result')
+Progress = Callable[[int], object]
+
+_AHEAD, _PER_WORKER = 2, 4
+"""Batches that are out at once, and batches in all where nothing is said, for each worker."""
+RETRIES = 3
+
+
+class Done(NamedTuple):
+    """A batch that came back: its place, a result for each item, and on which processor."""
+
+    place: int
+    results: list[Any]
+    processor: str
+
+
+def spread(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    executor: Executor | None = None,
+    batch: int | None = None,
+    progress: Progress = lambda _count: None,
+) -> list[Result]:
+    """The results of a function of each item, in the order of the items.
+
+    Args:
+        function: Of one item; for other processes one that they can import.
+        items: What it is called with.
+        executor: Where; threads, one a core, where None.
+        batch: Items that go out together; a task costs some milliseconds on other machines.
+        progress: Is told, now and then, how many more are done.
+
+    Raises:
+        WorkerError: If workers are lost, or have another version.
+    """
+    batches = batches_of(items, executor, batch)
+    found: list[list[Result]] = [[] for _ in batches]
+    for done in run_batches(function, batches, executor=executor):
+        found[done.place] = done.results
+        progress(len(done.results))
+    return list(itertools.chain.from_iterable(found))
+
+
+def batches_of(
+    items: Sequence[Item], executor: Executor | None, size: int | None = None
+) -> list[Sequence[Item]]:
+    """Items as they go out together: some batches for each worker where no size is said."""
+    size = size or max(1, math.ceil(len(items) / (_PER_WORKER * width_of(executor))))
+    return [items[k : k + size] for k in range(0, len(items), size)]
+
+
+def run_batches(
+    function: Callable[[Item], Any],
+    batches: Iterable[Sequence[Item]],
+    *,
+    executor: Executor | None,
+) -> Iterator[Done]:
+    """`spread`, each batch as it comes back; no more are out than keep the workers busy."""
+    waiting, processors = iter(enumerate(batches)), set[str]()
+    running: dict[Future[tuple[list[Any], str]], int] = {}
+    task = partial(_work, code_identity(), function)
+    with nullcontext(executor) if executor else futures.ThreadPoolExecutor(cores()) as pool:
+        try:
+            for place, batch in itertools.islice(waiting, _AHEAD * width_of(pool)):
+                running[pool.submit(task, batch)] = place
+            while running:
+                for future in futures.wait(running, return_when=futures.FIRST_COMPLETED).done:
+                    here = running.pop(future)
+                    for place, batch in itertools.islice(waiting, 1):
+                        running[pool.submit(task, batch)] = place
+                    results, processor = future.result()
+                    processors.add(processor)
+                    yield Done(here, results, processor)
+        except (futures.BrokenExecutor, futures.CancelledError):
+            reason = 'killed, perhaps for want of memory, or without their scheduler'
+            raise WorkerError(f'The workers are gone: {reason}.') from None
+        except ModuleNotFoundError as error:
+            raise WorkerError(f'The workers cannot do this: {error}.') from None
+        finally:
+            for future in running:
+                future.cancel()
+    if len(processors) > 1:
+        names = ', '.join(sorted(processors))
+        warnings.warn(f'Last bits may differ between the processors {names}.', stacklevel=2)
+
+
+def _work(code: str, function: Callable[[Item], Any], batch: Sequence[Item]) -> Any:
+    """What a worker does."""
+    if code != code_identity():
+        other = f'The worker {platform.node()} computes with {code_identity()}'
+        raise WorkerError(f'{other} and not, as asked, with {code}: install the same on both.')
+    return [function(item) for item in batch], processor_name()
+
+
+def cores() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def width_of(executor: Executor | None) -> int:
+    """How many workers an executor has, as far as it says."""
+    client = getattr(executor, '_client', None)  # Dask's
+    if client is not None:
+        return max(int(sum(client.nthreads().values())), 1)
+    said: int | None = getattr(executor, '_max_workers', None)
+    return said or cores()
+
+
+class Processes(Executor):
+    """Processes of this machine (None: a core each); where one is killed, others do its work."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        """Begin none yet."""
+        self._max_workers = workers or cores()
+        self._lock, self._pool = threading.Lock(), self._new()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """See Executor."""
+        outer: Future[Any] = Future()
+        self._begin(outer, partial(fn, *args, **kwargs), RETRIES)
+        return outer
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 -- Executor's
+        """See Executor."""
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def __exit__(self, kind: object, *_rest: object) -> None:
+        """Wait for what was begun; where something went wrong here, end it at once."""
+        begun = getattr(self._pool, '_processes', None) if kind else None
+        for process in list((begun or {}).values()):
+            process.terminate()
+        self.shutdown(cancel_futures=kind is not None)
+
+    def _new(self) -> futures.ProcessPoolExecutor:
+        # Not forked: threads of a library that has begun to compute do not survive that.
+        return futures.ProcessPoolExecutor(self._max_workers, multiprocessing.get_context('spawn'))
+
+    def _begin(self, outer: Future[Any], call: Callable[[], Any], retries: int) -> None:
+        with self._lock:
+            # Ctrl-C does not reach what is started here: this process ends it.
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                inner = self._pool.submit(call)
+            except futures.BrokenExecutor:
+                self._pool = self._new()
+                inner = self._pool.submit(call)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        inner.add_done_callback(partial(self._ended, outer, call, retries))
+
+    def _ended(
+        self, outer: Future[Any], call: Callable[[], Any], retries: int, inner: Future[Any]
+    ) -> None:
+        error = futures.CancelledError() if inner.cancelled() else inner.exception()
+        if isinstance(error, futures.BrokenExecutor) and retries and not outer.cancelled():
+            self._begin(outer, call, retries - 1)
+        elif outer.set_running_or_notify_cancel():
+            outer.set_exception(error) if error else outer.set_result(inner.result())
