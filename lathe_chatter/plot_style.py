@@ -60,6 +60,17 @@ def scale_for(unit: str, *values: Any) -> Scale:
     return Scale(1000.0**-power, f'{_PREFIXES[power]}{unit}')
 
 
+def text_of(value: float, unit: str) -> str:
+    """A quantity with the prefix that suits it, such as 200 µm.
+
+    Args:
+        value: In the unit.
+        unit: Without prefix.
+    """
+    scale = scale_for(unit, value)
+    return f'{value * scale.factor:.4g} {scale.unit}'
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure, inches.
 

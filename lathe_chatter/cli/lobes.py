@@ -19,19 +19,18 @@ from lathe_chatter.cli.common_options import (
 )
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.executor_options import add_executor, executor_of
-from lathe_chatter.cli.parameter_options import (
-    add_parameter_options,
-    config_of,
-    given_parameters,
-)
+from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact, Cut
-from lathe_chatter.model.parameters import described_by
 from lathe_chatter.model.quantities import Quantity, limits_of
-from lathe_chatter.model.uncertainty import uncertainty_from
+from lathe_chatter.model.uncertainty import Uncertainty, uncertainty_from
 from lathe_chatter.plot_style import files_of_picture
-from lathe_chatter.report.probability_chart import SURE
+from lathe_chatter.report.probability_chart import (
+    SURE,
+    cut_probability,
+    probability_sentence,
+)
 from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_lobes
 from lathe_chatter.stability import GrowthMap, SafeLimit, SpeedLaw, growth_map, lowest_limit
 from lathe_chatter.stability.probability import StabilityProbability, stability_probability
@@ -41,16 +40,19 @@ HELP = 'draw the stability chart: both limits, the seating line and the safe reg
 EXAMPLE = 'lathe-chatter lobes --bearing-clearance 1e-5 --map --csv lobes.csv'
 
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
-_USUAL = (1000.0, 12000.0)
-"""Range of speeds of a chart where nothing is said of the spindle, rev/min."""
-_DEPTH = Quantity('top of the chart', 'm', high=0.01, exclusive=True)
+_USUAL = (0.161, 1.933)
+"""Turns in a period of the most flexible mode, where nothing is said of the spindle: of the
+paper's machine 1000 to 12,000 rev/min."""
+_ABOUT_THE_CUT = 1.25
+"""Ratio of a usual range's ends to the speed of the cut, at least; of its top to the depth."""
+_DEPTH = Quantity(
+    'top of the chart', 'm', high=limits_of(Cut, 'depth_of_cut').high, exclusive=True
+)
 _HEADROOM = 2.6
 _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
 _PROBABLE_SPEEDS, _PROBABLE_MACHINES = 200, 1000
-_WORTH_A_WORD = 0.05
-"""Share of the variance below which a figure is not named."""
 _SHALLOWEST = 1000.0
 """Part of the top at which a map begins: at a depth of 0 there is no cut."""
 
@@ -59,11 +61,12 @@ def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
         '--from', dest='low', type=float, metavar='RPM',
-        help="lowest speed, rev/min (default: that of the machine file's spindle, else 1000)",
+        help="lowest speed, rev/min (default: that of the machine file's spindle, else one that "
+        'suits its most flexible mode)',
     )  # fmt: skip
     parser.add_argument(
         '--to', dest='high', type=float, metavar='RPM',
-        help="highest speed, rev/min (default: that of the machine file's spindle, else 12000)",
+        help='highest speed, rev/min (default: likewise)',
     )  # fmt: skip
     parser.add_argument(
         '--depth-limit', type=float, metavar='M', help='top of the chart, m (default: fits)'
@@ -97,7 +100,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Draw and print the chart."""
     config = config_of(options)
-    low, high = _speed_range(options)
+    low, high = _speed_range(options, config)
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
     files = files_of_picture(picture_file(options.output))
@@ -110,18 +113,19 @@ def run(options: Namespace) -> int:
         chart_speeds(low, high),
         tool_leaves_cut=config.setup.tool_leaves_cut,
     )
-    top = _top(limits) if options.depth_limit is None else options.depth_limit
+    top = _top(config.cut, limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
     screen = Screen(json=options.json)
     kept = options.output.with_suffix('.jsonl')
     growth, probability = None, None
+    known = _uncertainty(options, config)
     try:
         with executor_of(options, screen) as executor:
             wide = _Wide(screen, executor, kept)
             if options.map or config.cut.speed_variation_amplitude > 0.0:
                 growth = _map(config, low, high, top, SpeedLaw(options.law), wide)
-            else:
-                probability = _probability(options, config, low, high, wide)
+            elif known:
+                probability = _probability(config, known, low, high, wide)
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {kept}.')
         return INTERRUPTED
@@ -134,29 +138,47 @@ def run(options: Namespace) -> int:
     if growth is not None or probability is not None:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
-    if probability is not None:
-        _show_probability(config, probability, screen)
+    figures = _figures(config, limits, growth)
+    if probability is not None and known:
+        of_cut = stability_probability(
+            config.machine, known, config.cut, config.cut.spindle_speed_rpm,
+            tool_leaves_cut=config.setup.tool_leaves_cut,
+        )  # fmt: skip
+        screen.say(probability_sentence(config.cut, of_cut))
+        figures |= _probable_figures(config, probability, of_cut)
     for file in files:
         screen.name_file('picture', file)
-    screen.json(_figures(config, limits, growth, probability))
+    screen.json(figures)
     return 0
 
 
-def _speed_range(options: Namespace) -> tuple[float, float]:
-    """What is asked for, else the spindle's range, else a usual one, rev/min."""
-    low, high = _USUAL
-    described = described_by(given_parameters(options))
-    if described is not None and described.fastest_speed < _SPEED.high:
-        low, high = described.slowest_speed, described.fastest_speed
+def _speed_range(options: Namespace, config: LatheConfig) -> tuple[float, float]:
+    """What is asked for, else the spindle's range, else one that suits the machine, rev/min."""
+    spindle = config.described.speed_range if config.described else None
+    low, high = spindle or _usual_range(config)
     low = low if options.low is None else options.low
     high = high if options.high is None else options.high
     return _SPEED.check('--from', low), _SPEED.check('--to', high)
 
 
-def _top(limits: SafeLimit) -> float:
-    """Where a chart may end: some lowest limits up."""
+def _usual_range(config: LatheConfig) -> tuple[float, float]:
+    """Some lobes of the most flexible mode, and the cut, rev/min."""
+    modes = (*config.machine.tool.modes, *config.machine.workpiece.modes)
+    flexible = min(modes, key=lambda mode: mode.stiffness)
+    low, high = (
+        float(f'{turns * 60.0 * flexible.natural_frequency / (2.0 * math.pi):.2g}')
+        for turns in _USUAL
+    )
+    speed = config.cut.spindle_speed_rpm
+    low, high = min(low, speed / _ABOUT_THE_CUT), max(high, speed * _ABOUT_THE_CUT)
+    return max(low, _SPEED.low), min(high, _SPEED.high)
+
+
+def _top(cut: Cut, limits: SafeLimit) -> float:
+    """Where a chart may end: some lowest limits up, and above the cut."""
     lowest = float(np.min(limits.open_limit))
-    return min(_HEADROOM * lowest, _DEPTH.high) if math.isfinite(lowest) else 1e-3
+    deep = _ABOUT_THE_CUT * cut.depth_of_cut
+    return min(max(_HEADROOM * lowest, deep), _DEPTH.high) if math.isfinite(lowest) else 2.0 * deep
 
 
 class _Wide(NamedTuple):
@@ -186,45 +208,29 @@ def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where
         )
 
 
-def _probability(
-    options: Namespace, config: LatheConfig, low: float, high: float, wide: _Wide
-) -> StabilityProbability | None:
-    """Of a machine that is known with errors, None where nothing is said of any."""
-    known = None
+def _uncertainty(options: Namespace, config: LatheConfig) -> Uncertainty | None:
+    """Of the machine, None where nothing is said of any."""
     if options.uncertain is not None:
-        known = uncertainty_from(options.uncertain, config.machine)
-    elif described := described_by(given_parameters(options)):
-        known = described.uncertainty
-    if not known:
-        return None
+        return uncertainty_from(options.uncertain, config.machine)
+    return config.described.uncertainty if config.described else None
+
+
+def _probability(
+    config: LatheConfig, known: Uncertainty, low: float, high: float, wide: _Wide
+) -> StabilityProbability:
+    """How probable it is to be stable, over the chart."""
     with wide.screen.progress('machines as the truth may be', _PROBABLE_MACHINES) as bar:
         return stability_probability(
             config.machine,
             known,
             config.cut,
-            chart_speeds(low, high, _PROBABLE_SPEEDS),
+            np.linspace(low, high, _PROBABLE_SPEEDS),
             machines=_PROBABLE_MACHINES,
             tool_leaves_cut=config.setup.tool_leaves_cut,
             executor=wide.executor,
             kept_in=wide.kept,
             progress=bar.advance,
         )
-
-
-def _show_probability(
-    config: LatheConfig, probability: StabilityProbability, screen: Screen
-) -> None:
-    """What is safe at the speed of the cut, and what makes it uncertain."""
-    speed = config.cut.spindle_speed_rpm
-    sure = np.interp(speed, probability.spindle_speed_rpm, probability.safe_depth(SURE))
-    screen.say(f'stable with {SURE:.0%} at {speed:g} rev/min: up to {sure * 1e3:.4f} mm')
-    shares = [
-        f'{name} {share:.0%}'
-        for name, share in probability.worth_repeating(speed)
-        if share >= _WORTH_A_WORD
-    ]
-    if shares:
-        screen.say(f'uncertain there by: {", ".join(shares[:4])}')
 
 
 def _columns(config: LatheConfig, limits: SafeLimit) -> dict[str, Array]:
@@ -248,28 +254,25 @@ def _write_csv(path: Path, config: LatheConfig, limits: SafeLimit) -> None:
         writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
-def _figures(
-    config: LatheConfig,
-    limits: SafeLimit,
-    growth: GrowthMap | None,
-    probability: StabilityProbability | None,
-) -> dict[str, Any]:
+def _figures(config: LatheConfig, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
     """The chart as figures; an infinite limit is null in JSON."""
     return {
         'parameters': config.parameters(),
         **_columns(config, limits),
         **({} if growth is None else {'map': growth}),
-        **(
-            {}
-            if probability is None
-            else {
-                'safe_with_95_percent': {
-                    'spindle_speed_rpm': probability.spindle_speed_rpm,
-                    'depth_of_cut': probability.safe_depth(SURE),
-                },
-                'worth_repeating': dict(probability.worth_repeating(config.cut.spindle_speed_rpm)),
-            }
-        ),
+    }
+
+
+def _probable_figures(
+    config: LatheConfig, chart: StabilityProbability, of_cut: StabilityProbability
+) -> dict[str, Any]:
+    """How sure that is."""
+    return {
+        'safe_with_95_percent': {
+            'spindle_speed_rpm': chart.spindle_speed_rpm,
+            'depth_of_cut': chart.safe_depth(SURE),
+        },
+        'cut': cut_probability(config.cut, of_cut),
     }
 
 
@@ -287,4 +290,4 @@ def _show(config: LatheConfig, limits: SafeLimit, screen: Screen) -> None:
         where = f'at {low:.0f} rev/min'
         if high > low:
             where = f'in every lobe from {low:.0f} to {high:.0f} rev/min'
-        screen.say(f'lowest limit, {name}: {lowest * 1e3:.4f} mm {where}')
+        screen.say(f'lowest limit, {name}: {lowest * 1e3:.4g} mm {where}')

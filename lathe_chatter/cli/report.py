@@ -13,6 +13,8 @@ from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.report import draw_run
+from lathe_chatter.report.operating_points import probabilities_of
+from lathe_chatter.report.probability_chart import cut_probability, probability_sentence
 from lathe_chatter.report.run_history import History, read_history
 from lathe_chatter.report.signal_views import Excerpt, excerpts_of
 from lathe_chatter.stability import root_of
@@ -66,7 +68,14 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
     )
     if not any(series.size for series in history.estimates.values()):
         screen.say('No figure of a monitor is in the record.')
-    for sentence in (*_gap_sentences(history), *history.remarks):
+    probable = probabilities_of(history)
+    if probable:
+        screen.say(
+            'With the standard errors of its machine file (the errors that the model itself '
+            'makes are not among them):'
+        )
+    sentences = dict.fromkeys(probability_sentence(stay.cut, known) for stay, known in probable)
+    for sentence in (*sentences, *_gap_sentences(history), *history.remarks):
         screen.say(sentence)
     excerpts = excerpts_of(history)
     folder = history.path if history.path.is_dir() else history.path.parent
@@ -82,6 +91,9 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
         'gaps': history.samples.gaps,
         'sessions': [session.time for session in history.sessions],
         'remarks': history.remarks,
+        'probabilities': [
+            {'time': stay.start, **cut_probability(stay.cut, known)} for stay, known in probable
+        ],
         'moments': [_excerpt_figures(excerpt) for excerpt in excerpts],
     }
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_setup import LatheSetup
-from lathe_chatter.model.parameters import LATHE, cut_from, parameters_of, setup_from
+from lathe_chatter.model.machine_file import MachineDescription
+from lathe_chatter.model.parameters import (
+    LATHE,
+    MACHINE_FILE,
+    cut_from,
+    described_by,
+    parameters_of,
+    setup_from,
+)
 
 
 @dataclass(frozen=True)
@@ -20,10 +28,12 @@ class LatheConfig:
     Attributes:
         setup: Machine, force law and sampling.
         cut: What is cut at the start.
+        described: The machine file that was given: it says more than a lathe needs.
     """
 
     setup: LatheSetup = field(default_factory=LatheSetup)
     cut: Cut = field(default_factory=Cut)
+    described: MachineDescription | None = field(default=None, compare=False)
 
     @property
     def machine(self) -> Machine:
@@ -37,7 +47,10 @@ class LatheConfig:
 
     def parameters(self) -> dict[str, Any]:
         """Every parameter by its name, as `config_from` takes them."""
-        return parameters_of(self)
+        found = parameters_of(self)
+        if self.described is not None:
+            found[MACHINE_FILE.name] = replace(self.described, machine=self.machine).text()
+        return found
 
 
 def config_from(values: Mapping[str, Any]) -> LatheConfig:
@@ -62,4 +75,4 @@ def recorded_config(values: Mapping[str, Any]) -> LatheConfig:
     Raises:
         ParameterError: If a value is not allowed.
     """
-    return LatheConfig(setup_from(values), cut_from(values))
+    return LatheConfig(setup_from(values), cut_from(values), described_by(values))

@@ -43,23 +43,26 @@ _MODE = {
     'stiffness': Quantity('modal stiffness', 'N/m', high=1e18, exclusive=True),
     **dict.fromkeys(('chip', 'force', 'bearing'), _PARTICIPATION),
 }
-_BEARING = {
-    'stiffness': limits_of(Machine, 'bearing_stiffness'),
-    'clearance': limits_of(Cut, 'bearing_clearance'),
-}
-_MATERIAL = {'cutting_coefficient': limits_of(Machine, 'cutting_coefficient')}
+_UNCERTAIN = {k: _MODE[k] for k in ('frequency', 'damping_ratio', 'mass', 'stiffness')}
+_STIFFNESS = {'stiffness': limits_of(Machine, 'bearing_stiffness')}
+_COEFFICIENT = {'cutting_coefficient': limits_of(Machine, 'cutting_coefficient')}
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
 _SPINDLE = {
     'slowest_speed': _SPEED,
     'fastest_speed': _SPEED,
     'acceleration': limits_of(LatheSetup, 'spindle_acceleration'),
 }
+_CUT_OF_BEARING = {'clearance': 'bearing_clearance'}
+_CUT_OF_MATERIAL = {'process_damping': 'process_damping'}
 _CUT = {
-    'spindle_speed': _SPEED,
-    'depth_of_cut': limits_of(Cut, 'depth_of_cut'),
-    'feed': Quantity('feed per revolution', 'm', high=0.01),
+    'spindle_speed': 'spindle_speed_rpm',
+    'depth_of_cut': 'depth_of_cut',
+    'feed': 'feed_per_revolution',
+    'feed_speed': 'feed_speed',
+    'workpiece_diameter': 'workpiece_diameter',
 }
-_SPEED_RANGE = (('slowest', _SPEED.low), ('fastest', _SPEED.high))
+"""Names in the file of what are fields of a `Cut`, by section."""
+_USUAL_SPEED = Cut().spindle_speed_rpm
 _SECTIONS = ('tool', 'workpiece', 'bearing', 'material', 'spindle', 'cut')
 
 
@@ -84,6 +87,12 @@ class MachineDescription:
     spindle_acceleration: float = 0.0
     uncertainty: Uncertainty | None = None
     name: str = ''
+
+    @property
+    def speed_range(self) -> tuple[float, float] | None:
+        """Slowest and fastest speed of the spindle, rev/min; None where the file has neither."""
+        found = self.slowest_speed, self.fastest_speed
+        return None if found == (_SPEED.low, _SPEED.high) else found
 
     def text(self) -> str:
         """The same as one line of JSON, which `load_machine` takes: to the last bit."""
@@ -112,24 +121,26 @@ class MachineDescription:
                 made[name]['covariance'] = covariance.tolist()
         made['bearing'] = {
             'stiffness': self.machine.bearing_stiffness,
-            'clearance': self.cut.bearing_clearance,
+            **self._of_cut(_CUT_OF_BEARING),
             'contact': self.cut.bearing_contact.value,
         }
-        made['material'] = {'cutting_coefficient': self.machine.cutting_coefficient}
+        made['material'] = {
+            'cutting_coefficient': self.machine.cutting_coefficient,
+            **self._of_cut(_CUT_OF_MATERIAL),
+        }
         error = known.error_of('cutting_coefficient') if known else None
         if error:
             made['material']['errors'] = {'cutting_coefficient': f'{100.0 * error!r} %'}
-        made['spindle'] = {
-            'slowest_speed': self.slowest_speed,
-            'fastest_speed': self.fastest_speed,
-            'acceleration': self.spindle_acceleration,
-        }
-        made['cut'] = {
-            'spindle_speed': self.cut.spindle_speed_rpm,
-            'depth_of_cut': self.cut.depth_of_cut,
-            'feed': self.cut.feed,
-        }
+        if self.speed_range is not None:
+            slowest, fastest = self.speed_range
+            made['spindle'] = {'slowest_speed': slowest, 'fastest_speed': fastest}
+        if self.spindle_acceleration:
+            made.setdefault('spindle', {})['acceleration'] = self.spindle_acceleration
+        made['cut'] = self._of_cut(_CUT)
         return made
+
+    def _of_cut(self, names: dict[str, str]) -> dict[str, float]:
+        return {name: getattr(self.cut, field) for name, field in names.items()}
 
 
 def _described(mode: Mode) -> dict[str, Any]:
@@ -201,11 +212,19 @@ def _description(top: Section, name: str) -> MachineDescription:
     machine |= on_bearing or {}
     material = top.section('material')
     if material is not None:
-        material.only(*_MATERIAL, 'errors')
-        machine |= material.numbers(_MATERIAL)
-        for figure, error in material.errors(machine, _MATERIAL).items():
+        material.only(*_COEFFICIENT, *_CUT_OF_MATERIAL, 'errors')
+        found = material.numbers(_COEFFICIENT)
+        machine |= found
+        cut |= _fields(material, _CUT_OF_MATERIAL)
+        for figure, error in material.errors(found, _COEFFICIENT).items():
             known = known.with_error(figure, error)
-    cut |= _cut(top.section('cut'))
+    section = top.section('cut')
+    if section is not None:
+        section.only(*_CUT)
+        cut |= _fields(section, _CUT)
+        if 'feed_per_revolution' in cut:  # the feed speed at the start; a feed of 0 is none
+            per_minute = cut['feed_per_revolution'] * cut.get('spindle_speed_rpm', _USUAL_SPEED)
+            cut.setdefault('feed_speed', per_minute / 60.0)
     try:
         made, usual = Machine(**machine), Cut(**cut)
     except ParameterError as error:
@@ -218,12 +237,10 @@ def _bearing(section: Section | None) -> tuple[dict[str, float] | None, dict[str
     """What of the machine and what of the cut the bearing gives."""
     if section is None:
         return None, {}
-    section.only(*_BEARING, 'contact')
-    found = section.numbers(_BEARING)
-    machine = {'bearing_stiffness': found['stiffness']} if 'stiffness' in found else {}
-    cut: dict[str, Any] = {}
-    if 'clearance' in found:
-        cut['bearing_clearance'] = found['clearance']
+    section.only(*_STIFFNESS, *_CUT_OF_BEARING, 'contact')
+    found = section.numbers(_STIFFNESS)
+    machine = {'bearing_stiffness': found['stiffness']} if found else {}
+    cut: dict[str, Any] = _fields(section, _CUT_OF_BEARING)
     contact = section.nodes.get('contact')
     if contact is not None:
         words = [choice.value for choice in BearingContact]
@@ -240,7 +257,8 @@ def _spindle(section: Section | None) -> dict[str, float]:
         return {}
     section.only(*_SPINDLE)
     found = section.numbers(_SPINDLE)
-    slow, fast = (found.get(f'{which}_speed', limit) for which, limit in _SPEED_RANGE)
+    ends = ('slowest', _SPEED.low), ('fastest', _SPEED.high)
+    slow, fast = (found.get(f'{which}_speed', limit) for which, limit in ends)
     if not slow < fast:
         raise section.refused(
             f'fastest_speed is {fast:g} rev/min: it must be above slowest_speed, {slow:g} rev/min'
@@ -250,18 +268,10 @@ def _spindle(section: Section | None) -> dict[str, float]:
     return found
 
 
-def _cut(section: Section | None) -> dict[str, float]:
-    if section is None:
-        return {}
-    section.only(*_CUT)
-    found = section.numbers(_CUT)
-    speed = found.get('spindle_speed', Cut().spindle_speed_rpm)
-    cut = {'spindle_speed_rpm': speed}
-    if 'depth_of_cut' in found:
-        cut['depth_of_cut'] = found['depth_of_cut']
-    if 'feed' in found:
-        cut['feed_speed'] = found['feed'] * speed / 60.0
-    return cut
+def _fields(section: Section, names: dict[str, str]) -> dict[str, Any]:
+    """Those fields of a cut that a section has, by their names."""
+    found = section.numbers({name: limits_of(Cut, field) for name, field in names.items()})
+    return {names[name]: value for name, value in found.items()}
 
 
 def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], Uncertainty]:
@@ -276,7 +286,7 @@ def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], 
                 raise entry.refused(f'it needs {name}')
         if ('mass' in found) == ('stiffness' in found):
             raise entry.refused('it needs either mass or stiffness')
-        errors = entry.errors(found, _MODE)
+        errors = entry.errors(found, _UNCERTAIN)
         text = entry.nodes['frequency'].value
         omega = number_in(text, 'rad/s') if text.rstrip().endswith('rad/s') else None
         omega = omega or _TURN * found['frequency']

@@ -24,6 +24,9 @@ from lathe_chatter.model.quantities import Quantity, limits_of
 
 T = TypeVar('T')
 
+_SAMPLES_A_PERIOD = 10.0
+"""Of the highest mode of a machine file, at least."""
+
 
 def cut_from(values: Mapping[str, Any]) -> Cut:
     """The cut that parameters describe; what they leave out is the machine file's, or default.
@@ -33,7 +36,10 @@ def cut_from(values: Mapping[str, Any]) -> Cut:
         MachineFileError: If the parameter `machine` is no machine.
     """
     described = described_by(values)
-    return _made_like(described.cut if described else Cut(), values, complete=bool(described))
+    usual = described.cut if described else Cut()
+    if 'feed_speed' in values:  # given beside a file whose feed is per revolution, it rules
+        usual = usual.with_changes(feed_per_revolution=0.0)
+    return _made_like(usual, values, complete=bool(described))
 
 
 def machine_from(values: Mapping[str, Any]) -> Machine:
@@ -63,9 +69,20 @@ def setup_from(values: Mapping[str, Any]) -> LatheSetup:
     """
     own = {row.name: values[row.name] for row in SETUP_ROWS if row.name in values}
     described = described_by(values)
+    machine = machine_from(values)
     if described is not None:
         own.setdefault('spindle_acceleration', described.spindle_acceleration)
-    return LatheSetup(machine_from(values), **own)
+        own.setdefault('sample_rate', _rate_for(machine))
+    return LatheSetup(machine, **own)
+
+
+def _rate_for(machine: Machine) -> float:
+    """The usual sample rate, or what the highest mode of a machine needs, Hz."""
+    modes = (*machine.tool.modes, *machine.workpiece.modes)
+    highest = max(mode.natural_frequency for mode in modes) / (2.0 * math.pi)
+    limits = limits_of(LatheSetup, 'sample_rate')
+    needed = 1e3 * math.ceil(_SAMPLES_A_PERIOD * highest / 1e3)
+    return min(max(LatheSetup().sample_rate, needed), limits.high)
 
 
 def described_by(values: Mapping[str, Any]) -> MachineDescription | None:
@@ -164,15 +181,13 @@ class _Described:
 
 def _derived_lathe(given: Values) -> Resolved:
     """The machine's and the cut's derived values, once the two rates are known to agree."""
-    rates = [float(given.get(name, LATHE[name].default)) for name in ('sample_rate', 'tick_rate')]  # type: ignore[arg-type]  # checked numbers
-    samples_per_tick(*rates)
+    setup = setup_from(given)
+    samples_per_tick(setup.sample_rate, float(given.get('tick_rate', LATHE['tick_rate'].default)))  # type: ignore[arg-type]  # checked numbers
     if not given.get(MACHINE_FILE.name):
         return derived_machine(given)
-    setup, cut = setup_from(given), cut_from(given)
-    found = parameters_of(_Described(setup, cut))
-    changing = {row.name: found[row.name] for row in CUT_ROWS}
-    acceleration = setup.spindle_acceleration
-    return {**derived_machine(given), **changing, 'spindle_acceleration': acceleration}
+    found = parameters_of(_Described(setup, cut_from(given)))
+    names = [*(row.name for row in CUT_ROWS), 'spindle_acceleration', 'sample_rate']
+    return {**derived_machine(given), **{name: found[name] for name in names}}
 
 
 def _made_like(

@@ -21,7 +21,7 @@ MODAL = ('frequency', 'damping_ratio', 'stiffness')
 OF_MACHINE = ('cutting_coefficient',)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Variances and covariances of the logarithms of a machine's figures.
 
@@ -32,6 +32,14 @@ class Uncertainty:
 
     names: tuple[str, ...] = ()
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Uncertainty) or self.names != other.names:
+            return False
+        return np.array_equal(self.covariance, other.covariance)
+
+    def __hash__(self) -> int:
+        return hash(self.names)
 
     def __bool__(self) -> bool:
         return bool(self.names)
@@ -67,7 +75,10 @@ class Uncertainty:
         )
 
     def _with(self, names: tuple[str, ...], block: Array) -> Uncertainty:
+        unsure = np.diag(block) > 0.0  # what has no error is no part of it
         stay = [k for k, name in enumerate(self.names) if name not in names]
+        names = tuple(name for name, kept in zip(names, unsure, strict=True) if kept)
+        block = block[np.ix_(unsure, unsure)]
         size = len(stay) + len(names)
         whole = np.zeros((size, size))
         whole[: len(stay), : len(stay)] = self.covariance[np.ix_(stay, stay)]

@@ -76,9 +76,11 @@ class Section:
         section = self.section('errors')
         if section is None:
             return {}
-        section.only(*values)
+        section.only(*table)
         found = {}
         for name, node in section.nodes.items():
+            if name not in values:
+                raise section.refused(f'{name} has an error here and no value beside it', node)
             if isinstance(node, yaml.ScalarNode) and node.value.rstrip().endswith('%'):
                 relative = section.number(name, Quantity('standard error', high=10.0))
             else:

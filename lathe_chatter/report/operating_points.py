@@ -7,11 +7,21 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.machine_file import MachineDescription
+from lathe_chatter.model.quantities import limits_of
 from lathe_chatter.plot_style import ALARM
+from lathe_chatter.report.probability_chart import draw_probability
 from lathe_chatter.report.run_history import History
-from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
+from lathe_chatter.report.stability_chart import (
+    bearing_text,
+    chart_limits,
+    chart_speeds,
+    draw_limits,
+)
+from lathe_chatter.stability.probability import StabilityProbability, stability_probability
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +30,12 @@ _MOST_CHARTS = 3
 _AROUND = 1.35
 """Ratio of the chart's ends to the slowest and the fastest speed of the run."""
 _WAY = '#777777'
-_LOW, _HIGH = 60.0, 30000.0
+_SPEEDS = limits_of(Cut, 'spindle_speed_rpm').low, limits_of(Cut, 'spindle_speed_rpm').high
+_PROBABLE_SPEEDS = 150
+_OF_A_CHART = (
+    'bearing_contact', 'bearing_clearance', 'feed_speed', 'feed_per_revolution',
+    'process_damping', 'workpiece_diameter',
+)  # fmt: skip
 
 
 class Stay(NamedTuple):
@@ -41,14 +56,20 @@ class Stay(NamedTuple):
     chatter: bool
 
 
-class Bearing(NamedTuple):
-    """What a chart depends on beside speed and depth."""
+class ChartOf(NamedTuple):
+    """What a chart depends on beside speed and depth.
+
+    Attributes:
+        machine: That cut.
+        tool_leaves_cut: The force law, see `VirtualLathe`.
+        cut: Its bearing, feed and process damping, and nothing else.
+        described: The machine file, None where there was none.
+    """
 
     machine: Machine
     tool_leaves_cut: bool
-    contact: BearingContact
-    clearance: float
-    feed_speed: float
+    cut: Cut
+    described: MachineDescription | None
 
 
 def stays_of(history: History) -> list[Stay]:
@@ -68,33 +89,63 @@ def stays_of(history: History) -> list[Stay]:
     ]  # fmt: skip
 
 
-def bearings_of(history: History) -> list[Bearing]:
-    """The bearings that need a chart of their own, in order; the first few."""
-    found = [_bearing(history, stay) for stay in stays_of(history)]
-    return list(dict.fromkeys(found))[:_MOST_CHARTS]
+def charts_of(history: History) -> list[ChartOf]:
+    """The charts that a run needs, one for each bearing and feed, in order; the first few."""
+    found: list[ChartOf] = []
+    for stay in stays_of(history):
+        chart = _chart_of(history, stay)
+        if chart not in found:
+            found.append(chart)
+    return found[:_MOST_CHARTS]
 
 
-def _bearing(history: History, stay: Stay) -> Bearing:
-    session, cut = history.session_at(stay.start), stay.cut
-    bearing = cut.bearing_contact, cut.bearing_clearance, cut.feed_speed
-    return Bearing(session.machine, session.tool_leaves_cut, *bearing)
+def _chart_of(history: History, stay: Stay) -> ChartOf:
+    session = history.session_at(stay.start)
+    kept = {name: getattr(stay.cut, name) for name in _OF_A_CHART}
+    if stay.cut.feed_per_revolution:
+        kept['feed_speed'] = 0.0
+    return ChartOf(session.machine, session.tool_leaves_cut, Cut(**kept), session.described)
 
 
-def draw_path(axes: Axes, history: History, bearing: Bearing) -> None:
-    """The chart of a bearing, with every operating point that the run had with it."""
-    stays = stays_of(history)
-    here = [stay for stay in stays if _bearing(history, stay) == bearing]
-    speeds = [stay.cut.spindle_speed_rpm for stay in stays]
-    low = max(min(speeds) / _AROUND, _LOW)
-    high = min(max(speeds) * _AROUND, _HIGH)
-    limits = chart_limits(
-        bearing.machine, here[0].cut, chart_speeds(low, high),
-        tool_leaves_cut=bearing.tool_leaves_cut,
+def probabilities_of(history: History) -> list[tuple[Stay, StabilityProbability]]:
+    """The operating points of a run on machines that are known with errors, and how sure."""
+    found = []
+    for stay in stays_of(history):
+        speed = np.array([stay.cut.spindle_speed_rpm])
+        probability = _probability(_chart_of(history, stay), speed)
+        if probability is not None:
+            found.append((stay, probability))
+    return found
+
+
+def _probability(chart: ChartOf, speeds: ArrayLike) -> StabilityProbability | None:
+    """Of the machine of a chart, None where nothing is said of its errors."""
+    if chart.described is None or not chart.described.uncertainty:
+        return None
+    return stability_probability(
+        chart.machine, chart.described.uncertainty, chart.cut, speeds,
+        tool_leaves_cut=chart.tool_leaves_cut,
     )  # fmt: skip
+
+
+def draw_path(axes: Axes, history: History, chart: ChartOf) -> None:
+    """A chart with every operating point that the run had on it."""
+    stays = stays_of(history)
+    here = [stay for stay in stays if _chart_of(history, stay) == chart]
+    speeds = [stay.cut.spindle_speed_rpm for stay in stays]
+    slowest, fastest = (chart.described and chart.described.speed_range) or _SPEEDS
+    low = min(max(min(speeds) / _AROUND, slowest), *speeds)
+    high = max(min(max(speeds) * _AROUND, fastest), *speeds)
+    limits = chart_limits(
+        chart.machine, chart.cut, chart_speeds(low, high), tool_leaves_cut=chart.tool_leaves_cut
+    )
     lowest = float(limits.open_limit.min())
     deepest = max(stay.cut.depth_of_cut for stay in stays)
     top = max(1.4 * deepest, 1.6 * lowest if math.isfinite(lowest) else 0.0, 1e-6)
-    draw_limits(axes, limits, bearing.contact, top)
+    probability = _probability(chart, np.linspace(low, high, _PROBABLE_SPEEDS))
+    draw_limits(axes, limits, chart.cut.bearing_contact, top, shade=probability is None)
+    if probability is not None:
+        draw_probability(axes, probability, top)
     # Grey: the way into and out of this chart from others.
     for before, after in itertools.pairwise(stays):
         if before in here or after in here:
@@ -117,13 +168,7 @@ def draw_path(axes: Axes, history: History, bearing: Bearing) -> None:
         axes.plot([], [], 'o', color='k', mfc=ALARM, label='chatter flagged there')
     place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.17)}
     axes.legend(**place, ncols=3, fontsize=8, frameon=False)
-    title = {
-        BearingContact.NONE: 'no bearing clearance',
-        BearingContact.GAP: f'clearance {bearing.clearance * 1e6:g} µm, '
-        f'feed {bearing.feed_speed * 1e3:g} mm/s',
-        BearingContact.SEATED: 'on its bearing',
-    }[bearing.contact]
-    axes.set_title(f'stability chart: {title}', fontsize=10, color='k')
+    axes.set_title(f'stability chart: {bearing_text(chart.cut)}', fontsize=10, color='k')
 
 
 def _point(cut: Cut) -> tuple[float, float]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import Machine
-from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, Scale, grid, scale_for, widen
+from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, grid, scale_for, widen
 from lathe_chatter.report.run_history import History
 from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.stability import contact_at, root_of
@@ -23,9 +24,9 @@ _MODES_UP = 5.0
 _HEADROOM = 0.12
 """Of a portrait, above its curves."""
 _DECADES = 4.0
-_LEAST = 1e-6
-"""m: half an axis at least, and 1e-3 m/s. A cut at rest is a point: its rounding is no motion."""
-_LEAST_VELOCITY = 1e-3
+_LEAST = 0.1
+"""Half an axis at least, in parts of the largest displacement. A cut at rest is a point: its
+rounding is no motion."""
 _FAINTEST = 1e-9
 """m: what moves less is at rest: its spectrum would be one of rounding."""
 _TOP_AT_REST = 1e-6
@@ -36,17 +37,14 @@ def draw_portrait(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Phase portraits of tool and workpiece."""
     del history
     columns = excerpt.portrait
-    _draw_plane(
-        axes,
-        {
-            name: (columns[f'{name}_displacement'], columns[f'{name}_velocity'])
-            for name, _, _ in _BODIES
-        },
-        lines=True,
-    )
+    pairs = {
+        name: (columns[f'{name}_displacement'], columns[f'{name}_velocity'])
+        for name, _, _ in _BODIES
+    }
+    _draw_plane(axes, excerpt, pairs, lines=True)
     cut = excerpt.cut
     axes.set_title(
-        f'{excerpt.title} (to {excerpt.until:.2f} s)\n{cut.spindle_speed_rpm:g} rev/min, '
+        f'{excerpt.title} (to {excerpt.until:.4g} s)\n{cut.spindle_speed_rpm:g} rev/min, '
         f'{cut.depth_of_cut * 1e3:g} mm',
         fontsize=10,
     )
@@ -58,28 +56,35 @@ def draw_portrait(axes: Axes, history: History, excerpt: Excerpt) -> None:
 def draw_section(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Displacement and velocity once per turn: a point for what repeats with the spindle."""
     del history
-    sections = {name: excerpt.section(name) for name, _, _ in _BODIES}
-    _draw_plane(axes, {name: tuple(section) for name, section in sections.items()}, lines=False)
-    turns = len(sections['tool'].displacement)
-    axes.set_title(f'once per turn, {turns} turns', fontsize=10)
+    sections = {name: tuple(excerpt.section(name)) for name, _, _ in _BODIES}
+    _draw_plane(axes, excerpt, sections, lines=False)
+    turns = len(sections['tool'][0])
+    counted = {0: 'no whole turn', 1: '1 turn'}.get(turns, f'{turns} turns')
+    axes.set_title(f'once per turn, {counted}', fontsize=10)
 
 
 def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Amplitude spectra of both displacements, with the frequency that the root predicts."""
     session = history.session_at(excerpt.until)
-    highest = _highest_frequency(session.machine)
-    scale, top = Scale(1e6, 'µm'), 0.0
+    spectra = {name: excerpt.spectrum(f'{name}_displacement') for name, _, _ in _BODIES}
+    highest = min(
+        _highest_frequency(session.machine),
+        *(s.frequency.max(initial=0.0) for s in spectra.values()),
+    ) or _highest_frequency(session.machine)
+    top = max(
+        float(s.amplitude[s.frequency <= highest].max(initial=0.0)) for s in spectra.values()
+    )
+    scale = scale_for('m', max(top, _TOP_AT_REST))
     for name, colour, _ in _BODIES:
-        spectrum = excerpt.spectrum(f'{name}_displacement')
+        spectrum = spectra[name]
         shown = (spectrum.frequency <= highest) & (spectrum.amplitude > 0.0)
         if not shown.any() or spectrum.amplitude[shown].max() < _FAINTEST:
             continue
-        top = max(top, float(spectrum.amplitude[shown].max()))
         axes.plot(
             spectrum.frequency[shown], spectrum.amplitude[shown] * scale.factor,
             color=colour, lw=0.9, label=name,
         )  # fmt: skip
-    if not top:
+    if top < _FAINTEST:
         _say_at_rest(axes, 'no amplitude above 1 nm')
         top = _TOP_AT_REST
     contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
@@ -102,12 +107,19 @@ def _highest_frequency(machine: Machine) -> float:
     return _MODES_UP * max(mode.natural_frequency for mode in modes) / (2.0 * math.pi)
 
 
-def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool) -> None:
+def _draw_plane(
+    axes: Axes, excerpt: Excerpt, pairs: Mapping[str, tuple[Array, ...]], *, lines: bool
+) -> None:
     """Velocity over displacement of both bodies, as lines that end in a dot or as points."""
     from matplotlib.colors import to_rgb
 
-    places = scale_for('m', _LEAST, *(pair[0] for pair in pairs.values()))
-    speeds = scale_for('m/s', _LEAST_VELOCITY, *(pair[1] for pair in pairs.values()))
+    least = max(
+        _FAINTEST, *(_LEAST * float(np.abs(x).max(initial=0.0)) for x, _ in pairs.values())
+    )
+    modes = (*excerpt.machine.tool.modes, *excerpt.machine.workpiece.modes)
+    least_velocity = least * min(mode.natural_frequency for mode in modes)
+    places = scale_for('m', least, *(pair[0] for pair in pairs.values()))
+    speeds = scale_for('m/s', least_velocity, *(pair[1] for pair in pairs.values()))
     for name, colour, marker in _BODIES:
         place, velocity = pairs[name]
         x, y = place * places.factor, velocity * speeds.factor
@@ -117,8 +129,8 @@ def _draw_plane(axes: Axes, pairs: dict[str, tuple[Array, ...]], *, lines: bool)
         # From faint to full: whether the points run in or out is then plain.
         shades = [(*to_rgb(colour), alpha) for alpha in np.linspace(0.15, 1.0, x.size).tolist()]
         axes.scatter(x, y, s=9, color=shades, marker=marker, lw=0)
-    widen(axes, x=_LEAST * places.factor, y=_LEAST_VELOCITY * speeds.factor)
-    if all(x.size and float(np.ptp(x)) < _FAINTEST for x, _ in pairs.values()):
+    widen(axes, x=least * places.factor, y=least_velocity * speeds.factor)
+    if all(excerpt.size(f'{name}_displacement') < _FAINTEST for name, _, _ in _BODIES):
         _say_at_rest(axes, 'both at rest, within 1 nm')
     axes.set_xlabel(places.label('displacement'))
     axes.set_ylabel(speeds.label('velocity'))

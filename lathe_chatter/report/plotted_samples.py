@@ -40,6 +40,7 @@ class RunSamples:
         count: Of the samples.
         first: Simulated time of the first, s.
         last: Simulated time of the last, s.
+        step: Time from one to the next, s.
         gaps: Where samples are missing: simulated times before and after, s.
         restarts: Where simulated time went back: before and after, s.
         extremes: Of all signals.
@@ -64,7 +65,7 @@ class RunSamples:
                 self.extremes = self.extremes.extended(part, continuity)
         self.count, self.last = continuity.samples, continuity.last or 0.0
         self.gaps, self.restarts = continuity.gap_places, continuity.restart_places
-        self._step = continuity.step
+        self.step = continuity.step
 
     @classmethod
     def of(cls, signals: Mapping[str, Array]) -> RunSamples:
@@ -105,7 +106,7 @@ class RunSamples:
         """From when on there is no gap before `end`, s."""
         inside = [after for _, after in (*self.gaps, *self.restarts) if begin < after <= end]
         # The first sample after the gap belongs to it.
-        return max([begin, *(after - 0.5 * self._step for after in inside)])
+        return max([begin, *(after - 0.5 * self.step for after in inside)])
 
 
 class _InMemory(NamedTuple):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lathe_chatter.model import Cut
 from lathe_chatter.plot_style import SAFE
 from lathe_chatter.stability.probability import StabilityProbability
 
@@ -14,8 +15,47 @@ if TYPE_CHECKING:
 
 SURE = 0.95
 """The probability at which a depth is called safe."""
+_WORTH_A_WORD = 0.05
+"""Share of the variance below which a figure is not named."""
 _ROWS = 200
 _MILLI = 1e3
+
+
+def cut_probability(cut: Cut, probability: StabilityProbability) -> dict[str, Any]:
+    """How sure a cut is to be stable, up to where it is, and what makes it unsure.
+
+    Args:
+        cut: The operating point.
+        probability: At its speed.
+    """
+    return {
+        'spindle_speed_rpm': cut.spindle_speed_rpm,
+        'depth_of_cut': cut.depth_of_cut,
+        'stable_with': float(probability.at(cut.depth_of_cut)[0, 0]),
+        'safe_with_95_percent': float(probability.safe_depth(SURE)[0]),
+        'worth_repeating': dict(probability.worth_repeating(cut.spindle_speed_rpm)),
+    }
+
+
+def probability_sentence(cut: Cut, probability: StabilityProbability) -> str:
+    """The same in words."""
+    found = cut_probability(cut, probability)
+    share, drawn = found['stable_with'], len(probability.limits)
+    sure = found['safe_with_95_percent'] * _MILLI
+    least = max(min(share, 1.0 - 1.0 / drawn), 1.0 / drawn)
+    bound = {0.0: 'less than ', 1.0: 'more than '}.get(share, '')
+    said = (
+        f'At {cut.spindle_speed_rpm:g} rev/min {cut.depth_of_cut * _MILLI:g} mm is stable with '
+        f'{bound}{least:.1%}; up to {sure:.4g} mm is with {SURE:.0%}.'
+    )
+    repeat = [
+        f'{name} {part:.0%}'
+        for name, part in list(found['worth_repeating'].items())[:4]
+        if part >= _WORTH_A_WORD
+    ]
+    if repeat:
+        said += f' Worth measuring again, by their share: {", ".join(repeat)}.'
+    return said
 
 
 def draw_probability(axes: Axes, chart: StabilityProbability, depth_limit: float) -> None:
@@ -33,7 +73,7 @@ def draw_probability(axes: Axes, chart: StabilityProbability, depth_limit: float
     )  # fmt: skip
     bar = axes.figure.colorbar(
         colours, ax=axes, label='probability of being stable', pad=0.01,
-        boundaries=np.linspace(0.0, 1.0, 101), ticks=[0.0, 0.05, 0.25, 0.5, 0.75, SURE, 1.0],
+        boundaries=np.linspace(0.0, 1.0, 101), ticks=[0.0, 0.25, 0.5, 0.75, SURE],
     )  # fmt: skip
     bar.ax.axhline(SURE, color=SAFE, lw=2.0)
     sure = np.minimum(chart.safe_depth(SURE), 10.0 * depth_limit)

@@ -19,7 +19,8 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.lathe.cut_events import BEGINNING, BEGINNING_AGAIN, Change, Knock
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.parameters import cut_from, machine_from
+from lathe_chatter.model.machine_file import MachineDescription
+from lathe_chatter.model.parameters import cut_from, described_by, machine_from
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, message_of, recorded_cuts
@@ -74,6 +75,7 @@ class Session(NamedTuple):
         tool_leaves_cut: The force law, see `VirtualLathe`.
         spindle_acceleration: rev/min per s; 0 where the speed steps.
         known: Whether the record has its parameters; else they are those of the one before.
+        described: The machine file that it was given, None where there was none.
     """
 
     time: float
@@ -83,6 +85,7 @@ class Session(NamedTuple):
     tool_leaves_cut: bool
     spindle_acceleration: float
     known: bool
+    described: MachineDescription | None = None
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,7 @@ class History:
         spindle_acceleration: rev/min per s; 0 where the speed steps.
         later_sessions: After the first, one for each reset and each new start.
         known: Whether the parameters at the start are in the record.
+        described: The machine file that the lathe was given, None where there was none.
         remarks: What else is to be known, sentences: steps of the clock, contradictions.
     """
 
@@ -117,6 +121,7 @@ class History:
     spindle_acceleration: float = 0.0
     later_sessions: tuple[Session, ...] = ()
     known: bool = True
+    described: MachineDescription | None = None
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -124,7 +129,7 @@ class History:
         """All, in order."""
         first = Session(
             0.0, '', self.machine, self.start, self.tool_leaves_cut, self.spindle_acceleration,
-            self.known,
+            self.known, self.described,
         )  # fmt: skip
         return (first, *self.later_sessions)
 
@@ -243,6 +248,7 @@ def read_history(path: Path) -> History:
         spindle_acceleration=first.spindle_acceleration,
         later_sessions=tuple(sessions[1:]),
         known=first.known,
+        described=first.described,
         remarks=_remarks(cuts),
     )
 
@@ -259,6 +265,7 @@ def _sessions(cuts: RecordedCuts) -> list[Session]:
                 time, _REASONS[recorded.beginning], machine_from(values), cut_from(values),
                 bool(values.get('tool_leaves_cut', True)),
                 float(values.get('spindle_acceleration', 0.0)), bool(recorded.parameters),
+                described_by(values),
             )
         )  # fmt: skip
         time += float(cuts.timeline.last[recorded.blocks.stop - 1])

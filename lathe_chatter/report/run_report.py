@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lathe_chatter.plot_style import new_figure, save
-from lathe_chatter.report.operating_points import bearings_of, draw_path
+from lathe_chatter.report.operating_points import charts_of, draw_path
 from lathe_chatter.report.phase_and_spectrum import draw_portrait, draw_section, draw_spectrum
 from lathe_chatter.report.run_history import History
 from lathe_chatter.report.signal_views import Excerpt
@@ -30,8 +30,8 @@ def draw_run(history: History, excerpts: Sequence[Excerpt], path: Path) -> None:
         cells = rows[row].subgridspec(1, len(excerpts))
         for place, excerpt in enumerate(excerpts):
             draw(figure.add_subplot(cells[place]), history, excerpt)
-    bearings = bearings_of(history)
-    cells = rows[7].subgridspec(1, len(bearings))
-    for place, bearing in enumerate(bearings):
-        draw_path(figure.add_subplot(cells[place]), history, bearing)
+    charts = charts_of(history)
+    cells = rows[7].subgridspec(1, len(charts))
+    for place, chart in enumerate(charts):
+        draw_path(figure.add_subplot(cells[place]), history, chart)
     save(figure, path)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.report.run_history import History
 
-_LONGEST = 2.0
-"""s that an excerpt has at most."""
-_PORTRAIT = 0.25
-"""s that a phase portrait shows."""
+_LONGEST = 207.0
+"""Periods of the lowest mode that an excerpt has at most; of the paper's machine, 2 s."""
+_TURNS = 30.0
+"""Turns that it may last in any case."""
+_MOST_SAMPLES = 1_000_000
+_PORTRAIT = 26.0
+"""Periods of the lowest mode that a phase portrait shows; of the paper's machine, 0.25 s."""
 _FEWEST = 16
 
 
@@ -58,22 +61,24 @@ class Excerpt:
         title: Which excerpt of the run.
         until: Simulated time, s.
         cut: In force.
-        samples: By name of column, the last `_LONGEST` s at most.
+        samples: By name of column.
+        machine: That cut: what is long depends on it.
     """
 
     title: str
     until: float
     cut: Cut
     samples: dict[str, Array]
+    machine: Machine = field(default_factory=Machine)
 
     @property
     def portrait(self) -> dict[str, Array]:
-        """The last quarter of a second, for a phase portrait."""
-        inside = self.samples['time'] > self.until - _PORTRAIT
+        """The last periods, for a phase portrait."""
+        inside = self.samples['time'] > self.until - _PORTRAIT * _period(self.machine)
         return {name: values[inside] for name, values in self.samples.items()}
 
     def size(self, name: str) -> float:
-        """Peak to peak of a column in the last quarter of a second."""
+        """Peak to peak of a column in the last periods."""
         values = self.portrait[name]
         return float(np.ptp(values)) if values.size else math.nan
 
@@ -84,11 +89,14 @@ class Excerpt:
 
     @property
     def on_bearing(self) -> float:
-        """Share of the samples in which the bearing carries."""
-        if self.cut.bearing_contact is BearingContact.GAP:
-            touching = self.portrait['workpiece_displacement'] >= self.cut.bearing_clearance
-            return _share(touching)
-        return float(self.cut.bearing_contact is BearingContact.SEATED)
+        """Share of the samples in which the bearing carries; nan where no sample tells it."""
+        contact, gap = self.cut.bearing_contact, self.cut.bearing_clearance
+        if contact in {BearingContact.NONE, BearingContact.SEATED}:
+            return float(contact is BearingContact.SEATED)
+        if not clearance_is_seen(self.cut, self.machine):
+            return math.nan
+        place = self.portrait['workpiece_displacement']
+        return _share((np.abs(place) if contact is BearingContact.BOTH_SIDES else place) >= gap)
 
     def spectrum(self, name: str) -> Spectrum:
         """Amplitude spectrum of a column."""
@@ -104,11 +112,25 @@ class Excerpt:
         )
 
 
+def clearance_is_seen(cut: Cut, machine: Machine) -> bool:
+    """Whether the workpiece displacement of the samples is that at a bearing with clearance."""
+    with_clearance = cut.bearing_contact in {BearingContact.GAP, BearingContact.BOTH_SIDES}
+    modes = machine.workpiece.modes
+    return with_clearance and all(mode.bearing == mode.chip for mode in modes)
+
+
+def _period(machine: Machine) -> float:
+    """Of the slowest mode, s."""
+    modes = (*machine.tool.modes, *machine.workpiece.modes)
+    return 2.0 * math.pi / min(mode.natural_frequency for mode in modes)
+
+
 def excerpts_of(history: History) -> list[Excerpt]:
     """Two or three that are worth a closer look: before anything happened, chatter, the end."""
     end = history.duration
     disturbances = _disturbances(history)
-    first = disturbances[0] if disturbances else min(history.begin + _PORTRAIT, end)
+    periods = _PORTRAIT * _period(history.machine)
+    first = disturbances[0] if disturbances else min(history.begin + periods, end)
     wanted = [('before the first change' if disturbances else 'at the start', first)]
     spans = [span for span in history.chatter_spans() if span[1] > history.begin]
     if spans:
@@ -122,9 +144,12 @@ def excerpts_of(history: History) -> list[Excerpt]:
         [(begin, until) for begin, (_, until) in zip(begins, wanted, strict=True)]
     )
     return [
-        Excerpt(title, until, history.cut_at(0.5 * (begin + until)), signals)
+        Excerpt(
+            title, until, history.cut_at(0.5 * (begin + until)), signals,
+            history.session_at(until).machine,
+        )
         for (title, until), begin, signals in zip(wanted, begins, samples, strict=True)
-    ]
+    ]  # fmt: skip
 
 
 def _disturbances(history: History) -> list[float]:
@@ -140,7 +165,10 @@ def _undisturbed_since(history: History, until: float) -> float:
     before = (time for time in _disturbances(history) if time < until - 1e-9)
     # The first sample is in it: a span is what comes after its begin.
     begin = history.begin - 1e-9 * (1.0 + abs(history.begin))
-    return max(max(before, default=begin), until - _LONGEST)
+    machine, cut = history.session_at(until).machine, history.cut_at(until)
+    longest = max(_LONGEST * _period(machine), _TURNS * cut.delay)
+    longest = min(longest, _MOST_SAMPLES * history.samples.step)
+    return max(max(before, default=begin), until - longest)
 
 
 def spectrum(time: Array, signal: Array) -> Spectrum:

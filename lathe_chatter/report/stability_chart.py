@@ -11,7 +11,17 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.plot_style import LINE, OPEN, SAFE, SEATED, axes_or_new, grid, new_figure, save
+from lathe_chatter.plot_style import (
+    LINE,
+    OPEN,
+    SAFE,
+    SEATED,
+    axes_or_new,
+    grid,
+    new_figure,
+    save,
+    text_of,
+)
 from lathe_chatter.report.probability_chart import draw_probability
 from lathe_chatter.stability import GrowthMap, SafeLimit, safe_limit
 from lathe_chatter.stability.probability import StabilityProbability
@@ -39,7 +49,7 @@ def chart_limits(
 
     Args:
         machine: Tool, workpiece, bearing and material.
-        cut: Clearance, contact and feed speed.
+        cut: Clearance, contact and feed.
         speeds: Rising (n,), rev/min.
         tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
     """
@@ -117,26 +127,34 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
     draw_limits(axes, limits, cut.bearing_contact, depth_limit, shade=plain)
     if probability is not None:
         draw_probability(axes, probability, depth_limit)
-    if cut.depth_of_cut <= depth_limit:
+    slowest, fastest = limits.spindle_speed_rpm[[0, -1]].tolist()
+    if cut.depth_of_cut <= depth_limit and slowest <= cut.spindle_speed_rpm <= fastest:
         axes.plot(
             cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
             ms=7, label='the cut',
         )  # fmt: skip
     place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.1)}
     axes.legend(**place, ncols=5, fontsize=9, frameon=False)
-    bearing = {
-        BearingContact.NONE: 'no bearing clearance',
-        BearingContact.GAP: f'clearance {cut.bearing_clearance * 1e6:g} µm, '
-        f'feed {cut.feed_speed * 1e3:g} mm/s',
-        BearingContact.SEATED: 'on its bearing',
-    }[cut.bearing_contact]
-    text = f'Stability chart: {bearing}'
+    text = f'Stability chart: {bearing_text(cut)}'
     if varied and growth is not None:
         text += (
             f'; colours and heavy line: {growth.law.value} varied by '
             f'{cut.speed_variation_amplitude:.0%} at {cut.speed_variation_frequency:g} Hz'
         )
     axes.set_title(text, fontsize=11)
+
+
+def bearing_text(cut: Cut) -> str:
+    """What a chart is drawn for beside its axes."""
+    if cut.bearing_contact is BearingContact.NONE:
+        return 'no bearing clearance'
+    if cut.bearing_contact is BearingContact.SEATED:
+        return 'on its bearing'
+    feed = f'{cut.feed_speed * _MILLI:.4g} mm/s'
+    if cut.feed_per_revolution:
+        feed = f'{cut.feed_per_revolution * _MILLI:.4g} mm/rev'
+    sides = ' to both sides' if cut.bearing_contact is BearingContact.BOTH_SIDES else ''
+    return f'clearance {text_of(cut.bearing_clearance, "m")}{sides}, feed {feed}'
 
 
 def plot_lobes(
@@ -150,7 +168,7 @@ def plot_lobes(
 
     Args:
         machine: Tool, workpiece, bearing and material; by default the paper's.
-        cut: Clearance, contact, feed speed, and the point; by default the usual one.
+        cut: Clearance, contact, feed, and the point; by default the usual one.
         spindle_speed_rpm: Rising speeds, rev/min; by default from a third of the cut's to three
             times as much.
         axes: To draw into; by default those of a new figure.
@@ -232,7 +250,7 @@ def draw_limits(
             speeds, shown(limits.seated_limit), color=SEATED, lw=1.3, ls='--',
             label='limit, on its bearing',
         )  # fmt: skip
-    if contact is BearingContact.GAP and np.isfinite(limits.seating_line).any():
+    if contact is not BearingContact.SEATED and limits.seating_line.min() <= depth_limit:
         axes.plot(
             speeds, shown(limits.seating_line), color=LINE, lw=1.1, ls=':', label='seating line'
         )

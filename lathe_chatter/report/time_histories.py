@@ -10,7 +10,6 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
-from lathe_chatter.model import BearingContact
 from lathe_chatter.plot_style import (
     ALARM,
     ALARM_TEXT,
@@ -25,6 +24,7 @@ from lathe_chatter.plot_style import (
     widen,
 )
 from lathe_chatter.report.run_history import History
+from lathe_chatter.report.signal_views import clearance_is_seen
 from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ _GAPS = 200
 """That are hatched at most."""
 _SILENCE = 0.2
 """s between two figures of the monitor from which on they are not joined: it knew none."""
-_RAMP_POINTS = 25
+_RAMP_POINTS = 150
 """At which the root is computed while the spindle ramps."""
 _LEAST = {'m': 1e-9, 'N': 1e-3}
 """Half an axis at least. What moves less is at rest, and its rounding is no motion."""
@@ -66,14 +66,22 @@ def _draw_displacements(tool: Axes, workpiece: Axes, history: History) -> None:
     for axes, (name, colour) in zip((tool, workpiece), _BODIES, strict=True):
         scale = _draw_signal(axes, history, f'{name}_displacement', 'm', colour)
         axes.set_ylabel(f'{name}\n{scale.label("displacement")}')
-        if name == 'workpiece' and history.start.bearing_contact is not BearingContact.NONE:
-            edges = _edges(history)
-            gaps = [history.cut_at(edge).bearing_clearance * scale.factor for edge in edges]
+        edges = _edges(history)
+        if name == 'workpiece' and any(_clearance_is_seen(history, edge) for edge in edges):
+            gaps = [
+                history.cut_at(edge).bearing_clearance * scale.factor
+                if _clearance_is_seen(history, edge) else math.nan
+                for edge in edges
+            ]  # fmt: skip
             axes.step(
                 edges, gaps, where='post', color='k', lw=1, ls='--', label='bearing clearance'
             )
             _legend_above(axes)
         widen(axes, y=_LEAST['m'] * scale.factor)
+
+
+def _clearance_is_seen(history: History, time: float) -> bool:
+    return clearance_is_seen(history.cut_at(time), history.session_at(time).machine)
 
 
 def _draw_force(axes: Axes, history: History) -> None:
@@ -114,14 +122,14 @@ def _draw_rates(axes: Axes, history: History) -> None:
                 rates.append(_rate_at(history, float(time)))
     axes.plot(times, rates, color='k', lw=1.2, ls='--', label='rightmost root')
     known = history.estimates.get('growth_rate')
-    low, high = min(rates), max(rates)
+    low, high = min(0.0, *rates), max(0.0, *rates)
     if known is not None and known.shape[1]:
         measured = apart(known, _SILENCE)
         axes.plot(*measured, color=NEUTRAL, lw=1.0, marker='.', ms=1.5, label='monitor')
         spread = np.nanpercentile(known[1], [2, 98])
         low, high = min(low, spread[0]), max(high, spread[1])
-    margin = 0.15 * max(high - low, 1.0)
-    axes.set_ylim(min(low - margin, -5.0), max(high + margin, 5.0))
+    margin = 0.15 * (high - low or 1.0)
+    axes.set_ylim(low - margin, high + margin)
     axes.axhline(0.0, color='k', lw=0.8)
     _legend_above(axes)
     axes.set_ylabel('growth rate / s$^{-1}$')

@@ -120,7 +120,7 @@ def seating_depth(machine: Machine, bearing_clearance: float, feed: float) -> fl
 
 def _on_the_edge(cut: Cut, *, tool_leaves_cut: bool) -> bool:
     """Whether the workpiece stands exactly where its bearing begins, on one side."""
-    without_mean = not tool_leaves_cut or cut.feed_speed == 0.0
+    without_mean = not tool_leaves_cut or cut.feed == 0.0
     gap = cut.bearing_contact is BearingContact.GAP
     return gap and without_mean and cut.bearing_clearance == 0.0
 
@@ -143,13 +143,14 @@ def safe_limit(
     *,
     tool_leaves_cut: bool = True,
 ) -> SafeLimit:
-    """The edge of the safe region at the clearance and feed speed of a cut.
+    """The edge of the safe region at the clearance and feed of a cut.
 
     Args:
         machine: Tool, workpiece, bearing and material; or machines, of a shape that broadcasts
             with the speeds.
-        cut: Clearance, contact, feed speed; its own speed where none are given.
-        spindle_speed_rpm: Speeds of any shape, rev/min. The feed per revolution falls with them.
+        cut: Clearance, contact, feed; its own speed where none are given.
+        spindle_speed_rpm: Speeds of any shape, rev/min. A feed per revolution is one at all of
+            them; a feed speed is less per revolution the faster the spindle turns.
         tool_leaves_cut: Whether the force has a mean; the paper's linear force has none, and
             a workpiece that moves little then floats at any depth.
 
@@ -168,11 +169,13 @@ def safe_limit(
     if _always_seated(cut):
         line = np.zeros(floating.shape)
     elif _seats(cut) and tool_leaves_cut:
-        # The line is inverse to the feed, which is inverse to the speed.
-        feed = 60.0 * cut.feed_speed
+        # The line is inverse to the feed, which is one, or else inverse to the speed.
+        feed, per_feed = cut.feed_per_revolution, np.ones_like(speeds)
+        if not feed:
+            feed, per_feed = 60.0 * cut.feed_speed, speeds
         each = machine_array(machine)
         at_one = [seating_depth(one, cut.bearing_clearance, feed) for one in each.ravel()]
-        line = np.broadcast_to(np.reshape(at_one, each.shape) * speeds, floating.shape)
+        line = np.broadcast_to(np.reshape(at_one, each.shape) * per_feed, floating.shape)
     depth = np.where(floating <= line, floating, np.maximum(line, seated))
     if _on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
         depth = np.zeros(floating.shape)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +23,9 @@ workpiece:
     - {frequency: 754 rad/s, damping_ratio: 0.03, mass: 20 kg}
     - {frequency: 480, damping_ratio: 0.02, mass: 8, bearing: -0.8}
 bearing: {stiffness: 5.0e7, clearance: 12 um, contact: seated}
-material: {cutting_coefficient: 1500 MPa}
+material: {cutting_coefficient: 1500 MPa, process_damping: 450 kN/m}
 spindle: {slowest_speed: 60 rpm, fastest_speed: 3000, acceleration: 500 rpm/s}
-cut: {spindle_speed: 900 rpm, depth_of_cut: 0.5 mm, feed: 0.2 mm/rev}
+cut: {spindle_speed: 900 rpm, depth_of_cut: 0.5 mm, feed: 0.2 mm/rev, workpiece_diameter: 80 mm}
 """
 
 
@@ -42,7 +43,32 @@ def test_a_machine_with_units() -> None:
     assert found.cut.bearing_clearance == 12e-6
     assert found.cut.bearing_contact is BearingContact.SEATED
     assert found.cut.depth_of_cut == 5e-4
-    assert found.cut.feed == pytest.approx(2e-4, rel=1e-15)
+    assert (found.cut.feed_per_revolution, found.cut.feed) == (2e-4, 2e-4)
+    assert found.cut.feed_speed == pytest.approx(2e-4 * 15.0, rel=1e-15)
+    assert (found.cut.process_damping, found.cut.workpiece_diameter) == (4.5e5, 0.08)
+    assert found.speed_range == (60.0, 3000.0)
+
+
+def test_a_feed_is_per_revolution_or_a_speed() -> None:
+    per_turn, speed, none = (
+        load_machine(f'{{cut: {{spindle_speed: 600, {feed}}}}}').cut
+        for feed in ('feed: 0.1 mm/rev', 'feed_speed: 90 mm/min', 'feed: 0')
+    )
+    assert per_turn.with_changes(spindle_speed_rpm=1200.0).feed == 1e-4
+    assert speed.with_changes(spindle_speed_rpm=1200.0).feed == pytest.approx(75e-6)
+    assert none.feed == 0.0
+    # A feed speed that is given beside the file rules, and so it does after it was recorded.
+    config = config_from({'machine': SHAFT, 'feed_speed': 0.001})
+    assert config.cut.feed == pytest.approx(0.001 / 15.0)
+    assert config_from(config.parameters()) == config
+
+
+def test_a_fast_machine_is_sampled_fast_enough() -> None:
+    fast = '{tool: {modes: [{frequency: 5.05 kHz, damping_ratio: 2 %, mass: 4 g}]}}'
+    assert config_from({'machine': fast}).setup.sample_rate == 51e3
+    assert LATHE.complete({'machine': fast})['sample_rate'] == 51e3
+    assert config_from({'machine': fast, 'sample_rate': 2e4}).setup.sample_rate == 2e4
+    assert config_from({'machine': SHAFT}).setup.sample_rate == 1e4
 
 
 def test_the_shipped_paper_is_the_paper() -> None:
@@ -59,7 +85,16 @@ def test_what_is_saved_comes_back_to_the_last_bit(name: str, tmp_path: Path) -> 
     for again in (load_machine(tmp_path / 'again.yaml'), load_machine(found.text())):
         assert again.machine == found.machine
         assert again.cut == found.cut
+        assert again.speed_range == found.speed_range
         assert again.spindle_acceleration == found.spindle_acceleration
+
+
+def test_everything_that_a_file_says_comes_back(tmp_path: Path) -> None:
+    found = load_machine(SHAFT.replace('mass: 20 kg', 'mass: 20 kg, errors: {mass: 3 %}'))
+    cut = found.cut.with_changes(bearing_contact='both_sides', feed_speed=0.002)
+    found = replace(found, cut=cut, name='again')
+    found.save(tmp_path / 'again.yaml')
+    assert load_machine(tmp_path / 'again.yaml') == found
 
 
 @pytest.mark.parametrize(
@@ -108,6 +143,17 @@ def test_a_lathe_and_its_record_have_the_machine_of_a_file(tmp_path: Path) -> No
     file.unlink()  # what is recorded is the machine, and not where it stood
     again = config_from(config.parameters())
     assert again == config
+    assert again.described is not None
+    assert again.described.speed_range == (60.0, 3000.0)
+
+
+def test_a_record_has_the_standard_errors_of_a_file() -> None:
+    config = config_from({'machine': ERRORS, 'tool.mass': 3.0})
+    again = config_from(config.parameters())
+    assert again.described is not None
+    assert again.described.machine == config.machine
+    assert again.described.uncertainty is not None
+    assert again.described.uncertainty.error_of('cutting_coefficient') == pytest.approx(0.1)
 
 
 def test_what_is_given_beside_the_file_wins() -> None:

@@ -103,3 +103,13 @@ def test_the_lowest_limit_is_reached_in_every_lobe() -> None:
     for speed in (low, high):
         assert limits[speeds == speed] <= 1.005 * lowest
     assert lowest_limit(speeds, speeds) == (800.0, 800.0, 800.0)
+
+
+def test_with_a_feed_per_revolution_the_seating_line_is_one_depth() -> None:
+    cut = Cut(feed_per_revolution=4e-5, bearing_clearance=8e-6)
+    found = safe_limit(Machine(), cut, [1000.0, 2500.0, 9000.0])
+    expected = seating_depth(Machine(), 8e-6, 4e-5)
+    assert found.seating_line.tolist() == [expected] * 3
+    for speed, depth in ((1000.0, 0.99 * expected), (9000.0, 1.01 * expected)):
+        at = cut.with_changes(spindle_speed_rpm=speed, depth_of_cut=depth)
+        assert contact_at(Machine(), at).seated == (depth > expected)
