@@ -1,5 +1,5 @@
 # Two commands are all there is to know: `make run` and `make test`. Both install what they need.
-.PHONY: help run test test-core test-kilted lint everywhere bounds lock clean
+.PHONY: help run test test-core test-kilted lint docs everywhere bounds lock clean
 .DEFAULT_GOAL := help
 
 # Nodes of this checkout talk on this machine only, unless the user has said otherwise.
@@ -15,6 +15,7 @@ help:
 	@echo '           (make run ARGS="--scenario no_clearance" for another scenario)'
 	@echo 'make test  every test (make test ARGS="tests/recording -x" for some)'
 	@echo 'make lint  style and types'
+	@echo 'make docs  the documentation as a site: docs/_build/html/index.html'
 	@echo 'make test-core    the tests that do not talk to ROS'
 	@echo 'make test-kilted  what talks to ROS, on the wheels of ROS 2 Kilted instead of Jazzy'
 	@echo 'make everywhere   run and test as other users would: each Python, other folders and rights'
@@ -27,6 +28,12 @@ run:
 lint:
 	@python=$$(scripts/environment lint) && "$$python" -m ruff check . \
 	  && "$$python" -m ruff format --check . && "$$python" -m mypy
+
+# Strict: a dead link, a public name without a docstring or an example that fails is an error.
+docs:
+	@python=$$(scripts/environment docs) \
+	  && "$$python" -m sphinx -W --keep-going -q -b html docs docs/_build/html $(ARGS) \
+	  && echo 'docs/_build/html/index.html'
 
 test:
 	@python=$$(scripts/environment jazzy test) && "$$python" -m lathe_chatter.precompile \

@@ -45,6 +45,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/launch', sorted(str(file) for file in Path('launch').glob('*.py'))),
         # `ros2 run` looks here; pip alone would put the executables only on PATH.
         (f'lib/{NAME}', sorted(str(file) for file in Path('scripts/ros2_run').iterdir())),
         *(

@@ -23,7 +23,7 @@ class BearingContact(str, Enum):
     SEATED = 'seated'
     """The screening function is 1 throughout: the workpiece-spindle rests on its bearing."""
     BOTH_SIDES = 'both_sides'
-    """The bearing engages beyond the clearance on either side, |x_wp| >= gamma."""
+    """The bearing engages beyond the clearance on either side, abs(x_wp) >= gamma."""
 
 
 @dataclass(frozen=True)

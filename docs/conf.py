@@ -1,0 +1,54 @@
+"""The site: `make docs` builds it, strictly. What it says of the code is made from the code."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(HERE.parent))
+
+from reference_from_code import write_reference
+
+import lathe_chatter
+
+project = 'lathe_chatter'
+author = 'the lathe_chatter maintainers'
+project_copyright = '2026, the lathe_chatter maintainers'
+version = release = lathe_chatter.__version__
+
+extensions = [
+    'myst_nb',  # pages in Markdown, and notebooks, which it runs
+    'sphinx.ext.autodoc',
+    'sphinx.ext.napoleon',  # docstrings in Google's style
+    'sphinx_gallery.gen_gallery',  # examples/*.py with their pictures
+]
+html_theme = 'sphinx_rtd_theme'  # the one of the ROS 2 documentation
+html_title = f'lathe_chatter {release}'
+exclude_patterns = ['_build', 'reference/_made', '**/README.*', 'auto_examples/*.ipynb']
+suppress_warnings = ['config.cache']  # the gallery's sorting is a function
+
+myst_enable_extensions = ['dollarmath', 'colon_fence']
+myst_heading_anchors = 3
+nb_execution_mode = 'cache'
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+
+napoleon_use_ivar = True  # attributes once, from the docstring of their class
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'description'
+python_use_unqualified_type_names = True
+
+sphinx_gallery_conf = {
+    'examples_dirs': '../examples',
+    'gallery_dirs': 'auto_examples',
+    'filename_pattern': r'/.*\.py$',
+    'ignore_pattern': r'(__init__|notebooks/).*',
+    'abort_on_example_error': True,
+    'remove_config_comments': True,
+    'show_memory': False,
+    'download_all_examples': False,
+}
+
+write_reference(HERE / 'reference' / '_made')

@@ -1,0 +1,20 @@
+"""
+The stability chart and its third line
+======================================
+
+Below both limits a cut is stable. Between them a clearance decides: above the seating line the
+mean force presses the workpiece onto its bearing, and the limit of the seated machine holds.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import lathe_chatter as lc
+
+cut = lc.Cut(spindle_speed_rpm=3000.0, depth_of_cut=0.00062, bearing_clearance=5e-6)
+figure, axes = plt.subplots(figsize=(8, 4.5), layout='constrained')
+lc.plot_lobes(lc.Machine(), cut, axes=axes)
+for seated in (False, True):
+    limit = lc.critical_depth(lc.Machine(), 2 * np.pi * 50.0, seated=seated)
+    print(f'{"seated" if seated else "open"}: {limit * 1e3:.4f} mm at 3000 rev/min')
+plt.show()

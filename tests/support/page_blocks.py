@@ -1,0 +1,114 @@
+"""The code blocks of a page of the documentation, run in their order as a reader would."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+_BLOCK = re.compile(
+    r'(?:<!-- (?P<mark>[^\n]*?) -->\n)?^```(?P<kind>[a-z]+)\n(?P<text>.*?)^```$',
+    re.DOTALL | re.MULTILINE,
+)
+_NODE = re.compile(r'^ros2 run lathe_chatter (?!lathe-chatter)')
+_TIMEOUT = 300.0
+
+
+@dataclass(frozen=True)
+class Block:
+    """One code block: its language, text, and what the comment before it says of it."""
+
+    kind: str
+    text: str
+    mark: str
+    line: int
+
+    @property
+    def why_not(self) -> str:
+        """Why it is not run; empty where it is."""
+        return self.mark.removeprefix('not run: ') if self.mark.startswith('not run: ') else ''
+
+    @property
+    def talks_to_ros(self) -> bool:
+        """Whether it needs ROS 2."""
+        return not self.why_not and ('ros2 ' in self.text or 'import rclpy' in self.text)
+
+
+def pages() -> list[Path]:
+    """Every page that has code."""
+    found = sorted((ROOT / 'docs').rglob('*.md'))
+    return [page for page in found if not {'_made', '_build'} & {*page.parts} and blocks(page)]
+
+
+def blocks(page: Path) -> list[Block]:
+    """The blocks of a page that could be run: shell, Python, and MATLAB, which cannot."""
+    text = page.read_text(encoding='utf-8')
+    return [
+        Block(
+            found['kind'],
+            found['text'],
+            found['mark'] or '',
+            text[: found.start()].count('\n') + 1,
+        )
+        for found in _BLOCK.finditer(text)
+        if found['kind'] in {'sh', 'python', 'matlab'}
+    ]
+
+
+class Reader:
+    """Somebody who types what a page says, in a folder of his own."""
+
+    def __init__(self, folder: Path) -> None:
+        """Nothing typed yet."""
+        self.folder = folder
+        self._names: dict[str, Any] = {'__name__': '__main__'}
+        self._nodes: list[subprocess.Popen[bytes]] = []
+
+    def run(self, block: Block) -> None:
+        """Do one block; an error is the test's."""
+        if block.mark == 'ends the nodes':
+            self.end()
+        if block.kind == 'python':
+            exec(compile(block.text, '<page>', 'exec'), self._names)  # noqa: S102 -- our own pages
+            return
+        commands = re.sub(r'\\\n\s*', '', block.text).splitlines()
+        for command in (line for line in commands if line.strip() and not line.startswith('#')):
+            self._type(command, fails=block.mark == 'fails')
+
+    def end(self) -> None:
+        """End the nodes as Ctrl-C would."""
+        for node in self._nodes:
+            node.send_signal(signal.SIGINT)
+        for node in self._nodes:
+            assert node.wait(60.0) == 0
+        self._nodes.clear()
+
+    def _type(self, command: str, *, fails: bool) -> None:
+        paths = [str(Path(sys.executable).parent), os.environ['PATH']]
+        environment = {**os.environ, 'PATH': os.pathsep.join(paths), 'MPLBACKEND': 'Agg'}
+        environment['PYTHONPATH'] = str(ROOT / 'tests')
+        if _NODE.match(command):
+            words = _NODE.sub('', command).split()
+            self._nodes.append(subprocess.Popen(words, cwd=self.folder, env=environment))
+            return
+        if shutil.which('ros2') is None and command.startswith('ros2 '):
+            command = f'{sys.executable} -m support.ros2_commands {command[5:]}'
+        done = subprocess.run(
+            ['bash', '-c', command],
+            cwd=self.folder,
+            env=environment,
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT,
+        )
+        said = f'{command}\n{done.stdout}{done.stderr}'
+        assert 'Traceback' not in said, said
+        assert (done.returncode != 0) == fails, said
