@@ -3,7 +3,8 @@ How sure is the chart?
 ======================
 
 A tap test has errors. Drawn a thousand times within them, the machine gives at each speed not a
-limit but a probability: the depth below which 95 % of the machines are stable is the one to plan with.
+limit but a probability: the depth below which 95 % of the machines are stable is the one to plan
+with.
 """
 
 import matplotlib.pyplot as plt
