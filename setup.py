@@ -25,6 +25,7 @@ setup(
         'numba>=0.59,<0.69',
         'matplotlib>=3.7',  # the pictures of a run
         'rich>=13',  # tables and progress bars of the command line
+        'argcomplete>=2',  # completion of the command line in shells, as ros2 has it
         'jinja2>=3.1',  # the page of the reproduction, from a template
         'pyyaml>=6.0.1',  # scenario files and metadata.yaml
         'rosbags>=0.11',  # reads the runs of any rosbag2 writer, and knows the message types

@@ -5,10 +5,9 @@ A verb has NAME, HELP, EXAMPLE, configure(parser) and run(options) -> exit code.
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Action, ArgumentError, ArgumentParser, Namespace
 from collections.abc import Sequence
-from difflib import get_close_matches
-from typing import NoReturn, Protocol
+from typing import Any, NoReturn, Protocol
 
 from lathe_chatter import __version__
 from lathe_chatter.cli import (
@@ -24,6 +23,7 @@ from lathe_chatter.cli import (
     simulate,
     verify,
 )
+from lathe_chatter.errors import nearest_name
 
 _USER_ERROR = 2
 
@@ -78,11 +78,20 @@ class Parser(ArgumentParser):
         """Complain and end."""
         self.exit(_USER_ERROR, f'{self.prog}: {message}\nSee {self.prog} --help.\n')
 
+    def _check_value(self, action: Action, value: Any) -> None:
+        """Refuse a word that is none of the choices, and name the nearest."""
+        choices = list(action.choices or ())
+        if choices and value not in choices:
+            near = nearest_name(str(value), [str(choice) for choice in choices])
+            hint = f', perhaps {near}' if near else ''
+            allowed = ', '.join(str(choice) for choice in choices)
+            raise ArgumentError(action, f'{value!r} is none of {allowed}{hint}')
+
     def unknown(self, words: Sequence[str]) -> NoReturn:
         """Complain of words that are none of its options, and end."""
         known = [option for action in self._actions for option in action.option_strings]
-        near = get_close_matches(words[0].partition('=')[0], known, n=1)
-        hint = f', perhaps {near[0]}' if near else ''
+        near = nearest_name(words[0].partition('=')[0], known)
+        hint = f', perhaps {near}' if near else ''
         self.error(f'unrecognized arguments: {" ".join(words)}{hint}')
 
 

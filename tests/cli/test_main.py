@@ -195,3 +195,25 @@ def test_the_program_starts_without_ros_and_says_its_version(tmp_path: Path) -> 
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith('lathe-chatter ')
+
+
+def test_a_shell_may_ask_what_comes_next(tmp_path: Path) -> None:
+    answer = tmp_path / 'answer'
+    line = 'lathe-chatter lob'
+    environment = {
+        **os.environ,
+        '_ARGCOMPLETE': '1',
+        '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
+        'COMP_LINE': line,
+        'COMP_POINT': str(len(line)),
+    }
+    command = [sys.executable, '-m', 'lathe_chatter.cli']
+    subprocess.run(command, env=environment, check=False, timeout=120)
+    assert answer.read_text().strip() == 'lobes'
+
+
+def test_a_misspelt_verb_is_told_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(['lobs'])
+    assert ended.value.code == 2
+    assert 'perhaps lobes' in capsys.readouterr().err
