@@ -50,12 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(each, end)
         from lathe_chatter.cli.verbs import BEGINNING, parser
 
-        words = parser()
-        if '_ARGCOMPLETE' in os.environ:  # a shell asks what may come next
-            import argcomplete
-
-            argcomplete.autocomplete(words)
-        options, unknown = words.parse_known_args(arguments)
+        options, unknown = parser().parse_known_args(arguments)
         if unknown:  # argparse itself would show how to give a verb, not its options
             options.usage_of.unknown(unknown)
         if options.verb is None:

@@ -5,6 +5,7 @@ A verb has NAME, HELP, EXAMPLE, configure(parser) and run(options) -> exit code.
 
 from __future__ import annotations
 
+import os
 from argparse import Action, ArgumentError, ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import Any, NoReturn, Protocol
@@ -113,4 +114,8 @@ def parser() -> Parser:
         )
         verb.configure(entry)
         entry.set_defaults(run=verb.run, usage_of=entry)
+    if '_ARGCOMPLETE' in os.environ:  # a shell asks what may come next
+        import argcomplete
+
+        argcomplete.autocomplete(result)
     return result
