@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.model.units import number_in
 from lathe_chatter.scenario import CLEARED, FLAGGED, Scenario, shipped_scenarios
 
 PICTURES = ('.png', '.svg', '.pdf')
@@ -27,6 +28,20 @@ def add_json(parser: ArgumentParser) -> None:
         '--json', action='store_true',
         help='print the figures as JSON, and all else on standard error',
     )  # fmt: skip
+
+
+def in_unit(unit: str) -> Callable[[str], object]:
+    """What an option with a unit is taken for: the number that a text is, or else the text.
+
+    Args:
+        unit: SI, or rev/min; what is written without a unit is in it.
+    """
+
+    def parsed(text: str) -> object:
+        number = number_in(text, unit)
+        return text if number is None else number  # what it must be is said where it is used
+
+    return parsed
 
 
 def add_force(parser: ArgumentParser) -> None:

@@ -10,12 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.cli.common_options import add_force, add_json
+from lathe_chatter.cli.common_options import add_force, add_json, in_unit
 from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.model import Machine, Mode
 from lathe_chatter.model.cut import BearingContact
 from lathe_chatter.model.machine import Structure
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
+from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.model.uncertainty import Uncertainty
 from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.tap_test import ModalFit, fit_modes, read_frequency_responses
@@ -25,6 +26,7 @@ HELP = 'make a machine file from tap tests: the modes of tool and workpiece, and
 EXAMPLE = 'lathe-chatter identify tool=tool.uff workpiece=shaft.csv --output machine.yaml'
 
 _BODIES = ('tool', 'workpiece')
+_HIGHEST = Quantity('end of a band', 'Hz', high=1e6)
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -48,15 +50,11 @@ def configure(parser: ArgumentParser) -> None:
         help='number of modes (default: found)',
     )  # fmt: skip
     parser.add_argument(
-        '--from',
-        dest='low',
-        type=float,
-        default=0.0,
-        metavar='HZ',
+        '--from', dest='low', type=in_unit('Hz'), default=0.0, metavar='HZ',
         help='lowest frequency used, Hz',
-    )
+    )  # fmt: skip
     parser.add_argument(
-        '--to', dest='high', type=float, default=math.inf, metavar='HZ',
+        '--to', dest='high', type=in_unit('Hz'), default=_HIGHEST.high, metavar='HZ',
         help='highest frequency used, Hz',
     )  # fmt: skip
     add_force(parser)
@@ -84,6 +82,7 @@ def run(options: Namespace) -> int:
     picture = output.with_suffix('.png')
     keep_existing(output, *files_of_picture(picture), force=options.force)
     base = _base(options.machine)
+    low, high = _HIGHEST.check('--from', options.low), _HIGHEST.check('--to', options.high)
     fits: dict[str, ModalFit] = {}
     with screen.working('Fitting the modes ...'):
         for body in _BODIES:
@@ -93,8 +92,8 @@ def run(options: Namespace) -> int:
                 fits[body] = fit_modes(
                     responses,
                     modes=dict(options.modes).get(body),
-                    lowest_frequency=options.low,
-                    highest_frequency=options.high,
+                    lowest_frequency=low,
+                    highest_frequency=high,
                 )
     described = _described(base, fits)
     with writing(output):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.cli.common_options import add_force, add_json
+from lathe_chatter.cli.common_options import add_force, add_json, in_unit
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.executor_options import add_executor, executor_of
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
@@ -16,8 +16,8 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
 from lathe_chatter.knocks.knock_map import Point
 from lathe_chatter.model import Cut
-from lathe_chatter.model.quantities import quantity_of
-from lathe_chatter.plot_style import files_of_picture
+from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.plot_style import files_of_picture, text_of
 from lathe_chatter.stability import contact_at
 
 NAME = 'knock-map'
@@ -72,11 +72,12 @@ def run(options: Namespace) -> int:
     """Compute, or continue, and draw."""
     from lathe_chatter.report.knock_map import draw_knock_map
 
+    config = config_of(options)
     speeds, depths, clearances = (
-        _axis(option, field, getattr(options, option)) for option, field, _ in _AXES
+        _axis(option, field, getattr(options, option), config.cut) for option, field, _ in _AXES
     )
     grid = KnockGrid(
-        config_of(options), speeds, depths, clearances,
+        config, speeds, depths, clearances,
         options.reach, options.step, options.tolerance,
     )  # fmt: skip
     files = files_of_picture(options.output)
@@ -102,21 +103,18 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _axis(option: str, field: str, text: str | None) -> tuple[float, ...]:
-    """`A:B:N` or a single value as values of a field of the cut.
+def _axis(option: str, field: str, text: str | None, cut: Cut) -> tuple[float, ...]:
+    """`A:B:N`, a single value, or that of the cut as values of a field of it.
 
     Raises:
         ParameterError: If it is neither, or a value is not allowed.
     """
-    limits = quantity_of(Cut.__dataclass_fields__[field])
-    if text is None or limits is None:
-        return (float(getattr(Cut(), field)),)
+    limits = limits_of(Cut, field)
+    if text is None:
+        return (float(getattr(cut, field)),)
     parts = text.split(':')
-    try:
-        values = [float(part) for part in parts[:2]]
-        count = int(parts[2]) if len(parts) == 3 else 1
-    except ValueError:
-        values, count = [], 0
+    values = [in_unit(limits.unit)(part) for part in parts[:2]]
+    count = int(parts[2]) if len(parts) == 3 and parts[2].isdigit() else 1
     if len(parts) not in {1, 3} or count < (2 if len(parts) == 3 else 1):
         raise ParameterError(f'--{option}', text, '', 'one value, or A:B:N with N of 2 or more')
     checked = [limits.check(f'--{option}', value) for value in values]
@@ -144,9 +142,9 @@ def _show(knocks: KnockMap, screen: Screen) -> None:
         screen.say(
             f'Weakest: {point.spindle_speed_rpm:g} rev/min, {point.depth_of_cut * 1e3:.4g} mm '
             f'(limit {stable.limit * 1e3:.4g} mm), clearance '
-            f'{point.bearing_clearance * 1e6:.4g} µm: a knock of '
-            f'{abs(limit.impulse) * 1e3:.4g} mN s lasts, of {limit.survived * 1e3:.4g} mN s '
-            f'dies out; chatter of {limit.amplitude * 1e6:.3g} µm peak to peak at the tool.'
+            f'{text_of(point.bearing_clearance, "m")}: a knock of '
+            f'{text_of(abs(limit.impulse), "N s")} lasts, of {text_of(limit.survived, "N s")} '
+            f'dies out; chatter of {text_of(limit.amplitude, "m")} peak to peak at the tool.'
         )
 
 

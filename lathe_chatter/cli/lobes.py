@@ -15,6 +15,7 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.cli.common_options import (
     add_force,
     add_json,
+    in_unit,
     picture_file,
 )
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
@@ -60,16 +61,16 @@ _SHALLOWEST = 1000.0
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
-        '--from', dest='low', type=float, metavar='RPM',
+        '--from', dest='low', type=in_unit('rev/min'), metavar='RPM',
         help="lowest speed, rev/min (default: that of the machine file's spindle, else one that "
         'suits its most flexible mode)',
     )  # fmt: skip
     parser.add_argument(
-        '--to', dest='high', type=float, metavar='RPM',
+        '--to', dest='high', type=in_unit('rev/min'), metavar='RPM',
         help='highest speed, rev/min (default: likewise)',
     )  # fmt: skip
     parser.add_argument(
-        '--depth-limit', type=float, metavar='M', help='top of the chart, m (default: fits)'
+        '--depth-limit', type=in_unit('m'), metavar='M', help='top of the chart, m (default: fits)'
     )
     parser.add_argument(
         '--uncertain', metavar='LIST',

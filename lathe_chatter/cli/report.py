@@ -12,6 +12,7 @@ from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.lathe.cut_events import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.plot_style import text_of
 from lathe_chatter.report import draw_run
 from lathe_chatter.report.operating_points import probabilities_of
 from lathe_chatter.report.probability_chart import cut_probability, probability_sentence
@@ -158,7 +159,7 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
         if ramp.start < ramp.end <= history.duration
     ]
     result += [
-        _entry(history, knock.time, f'knock, {knock.impulse * 1e3:g} mN s')
+        _entry(history, knock.time, f'knock, {text_of(knock.impulse, "N s")}')
         for knock in history.knocks
     ]
     for flag in history.flags:

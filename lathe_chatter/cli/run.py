@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verd
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.errors import RunFailedError, RunReadError
+from lathe_chatter.model.machine_file import load_machine
+from lathe_chatter.model.parameters import MACHINE_FILE
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.entry_points import no_ros
 from lathe_chatter.recording import read_run
@@ -40,6 +43,10 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         '--output', type=Path, metavar='DIR', help='folder to make (default: runs/<date-time>)'
     )
+    parser.add_argument(
+        '--machine', metavar='FILE',
+        help="machine file in place of the scenario's: a path, or the name of one that is shipped",
+    )  # fmt: skip
     add_json(parser)
 
 
@@ -47,6 +54,10 @@ def run(options: Namespace) -> int:
     """Play the scenario; 0 if the monitor said what the scenario expects, else 1."""
     file = utf8('--scenario', find_scenario(options.scenario))
     scenario = load_scenario(file)
+    if options.machine is not None:
+        load_machine(options.machine)
+        parameters = {**scenario.parameters, MACHINE_FILE.name: options.machine}
+        scenario = replace(scenario, parameters=parameters)
     output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
     if utf8('--output', output).exists():
         raise RunFailedError(f'{output} exists already: give another --output.')

@@ -7,13 +7,15 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verdict
+from lathe_chatter.cli.common_options import add_json, in_unit, scenario_help, utf8, verdict
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.cut_events import Knock
+from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.units import number_in
 from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (
     CLEARED,
@@ -38,7 +40,7 @@ def configure(parser: ArgumentParser) -> None:
         '--output', type=Path, required=True, metavar='DIR', help='folder of the run, to make'
     )
     parser.add_argument(
-        '--duration', type=float, metavar='S',
+        '--duration', type=in_unit('s'), metavar='S',
         help=f"simulated time, s (default: the scenario's, else {_USUAL_DURATION:g})",
     )  # fmt: skip
     parser.add_argument(
@@ -111,12 +113,11 @@ def _knock(text: str, duration: float) -> Knock:
         ParameterError: If it is none.
     """
     time_text, _, impulse_text = text.partition(':')
-    try:
-        at, impulse = float(time_text), float(impulse_text)
-    except ValueError:
-        raise ParameterError('--knock', text, '', 'T:J, as 1.5:0.002') from None
+    at, impulse = number_in(time_text, 's'), number_in(impulse_text, 'N s')
+    if at is None or impulse is None:
+        raise ParameterError('--knock', text, '', 'T:J, as 1.5:0.002')
     Quantity('time', 's', high=duration).check('--knock', at)
-    Quantity('impulse', 'N s', low=-1e3, high=1e3).check('--knock', impulse)
+    IMPULSE.check('--knock', impulse)
     return Knock(at, impulse)
 
 

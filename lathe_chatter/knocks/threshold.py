@@ -159,6 +159,9 @@ def _upwards(forward: float, backward: float, largest: float, ratio: float) -> I
 
 def _check_steady(cut: Cut) -> None:
     """See that nothing but the knock disturbs the cut."""
-    for name in ('force_noise', 'sensor_noise', 'runout', 'speed_variation_amplitude'):
+    for name in (
+        'force_noise', 'cutting_force_noise', 'sensor_noise', 'runout', 'unbalance',
+        'speed_variation_amplitude',
+    ):  # fmt: skip
         if getattr(cut, name) != 0.0:
             raise ParameterError(name, getattr(cut, name), '', '0, so that the knock is alone')

@@ -18,7 +18,7 @@ from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity, count_of
 from lathe_chatter.samples import sample_columns
 
-IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e3, high=1e3)
+IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e6, high=1e6)
 
 _ROOM = 512
 """Nodes of the surface for which there is room at first."""

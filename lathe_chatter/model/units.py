@@ -35,7 +35,7 @@ UNITS: dict[str, dict[str, float]] = {
         'N/m2': 1.0, 'N/mm2': 1e6, 'Pa': 1.0, 'kPa': 1e3, 'MPa': 1e6, 'GPa': 1e9,
     },
     'kg m': {'kg m': 1.0, 'g mm': 1e-6, 'kg mm': 1e-3},
-    'N s': {'N s': 1.0, 'mN s': 1e-3},
+    'N s': {'N s': 1.0, 'kN s': 1e3, 'mN s': 1e-3, 'uN s': 1e-6},
     's': {'s': 1.0, 'ms': 1e-3, 'min': 60.0},
     'N/sqrt(Hz)': {'N/sqrt(Hz)': 1.0},
 }  # fmt: skip

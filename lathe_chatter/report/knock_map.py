@@ -10,13 +10,18 @@ import numpy as np
 
 from lathe_chatter.knocks import KnockMap, Margin
 from lathe_chatter.knocks.knock_map import Point
-from lathe_chatter.plot_style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save
-from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
+from lathe_chatter.plot_style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save, scale_for
+from lathe_chatter.report.stability_chart import (
+    bearing_text,
+    chart_limits,
+    chart_speeds,
+    draw_limits,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MILLI, _MICRO = 1e3, 1e6
+_MILLI = 1e3
 
 
 def draw_knock_map(knocks: KnockMap, path: Path) -> None:
@@ -49,7 +54,7 @@ def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
             if limit is None:
                 continue
             if limit.margin is Margin.FINITE:
-                impulse[row, column] = abs(limit.impulse) * _MILLI
+                impulse[row, column] = abs(limit.impulse)
             else:
                 kind[row, column] = float(limit.margin is Margin.UNSTABLE)
     axes.pcolormesh(
@@ -57,12 +62,15 @@ def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
         shading='nearest', rasterized=True,
     )  # fmt: skip
     if np.isfinite(impulse).any():
+        scale = scale_for('N s', impulse[np.isfinite(impulse)])
+        impulse *= scale.factor
         low, high = float(np.nanmin(impulse)), float(np.nanmax(impulse))
         colours = axes.pcolormesh(
             speeds, depths, impulse, cmap='inferno', norm=LogNorm(low, max(high, 1.01 * low)),
             shading='nearest', rasterized=True,
         )  # fmt: skip
-        axes.figure.colorbar(colours, ax=axes, label='smallest lasting knock / (mN s)', pad=0.01)
+        label = f'smallest lasting knock / ({scale.unit})'
+        axes.figure.colorbar(colours, ax=axes, label=label, pad=0.01)
     cut = of.config.cut.with_changes(bearing_clearance=clearance)
     limits = chart_limits(of.config.machine, cut, chart_speeds(speeds[0], speeds[-1]))
     draw_limits(axes, limits, cut.bearing_contact, of.depths[-1], shade=False)
@@ -72,13 +80,16 @@ def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
     axes.legend(
         loc='upper center', bbox_to_anchor=(0.5, -0.13), ncols=5, fontsize=9, frameon=False
     )
-    axes.set_title(f'The knock that a cut survives: clearance {clearance * _MICRO:g} µm', size=11)
+    axes.set_title(f'The knock that a cut survives: {bearing_text(cut)}', size=11)
 
 
 def _draw_curves(axes: Axes, knocks: KnockMap) -> None:
     """Impulse over whichever of clearance, speed and depth varies."""
     of = knocks.grid
-    name, factor, label, values = 'bearing_clearance', _MICRO, 'clearance / µm', of.clearances
+    gaps = scale_for('m', np.array(of.clearances))
+    name, factor, label, values = (
+        'bearing_clearance', gaps.factor, gaps.label('clearance'), of.clearances,
+    )  # fmt: skip
     if len(of.speeds) > 1:
         name, factor, label, values = (
             'spindle_speed_rpm', 1.0, 'spindle speed / (rev/min)', of.speeds,
@@ -89,13 +100,21 @@ def _draw_curves(axes: Axes, knocks: KnockMap) -> None:
     x = np.array([getattr(point, name) * factor for point in points])
     limits = [knocks.limits[point] for point in points]
     shown = np.array([lim.impulse if lim.margin is Margin.FINITE else math.nan for lim in limits])
-    axes.plot(x, np.abs(shown) * _MILLI, 'o-', color=SEATED, ms=4, label='smallest lasting knock')
+    scale = scale_for(
+        'N s', [abs(k) for limit in limits for k in (limit.impulse, limit.linear, limit.searched)
+                if math.isfinite(k)],
+    )  # fmt: skip
     linear = np.array([limit.linear if limit.linear > 0.0 else math.nan for limit in limits])
-    axes.plot(x, linear * _MILLI, '-', color=OPEN, lw=1.2, label='below: dies out for sure')
     tried = np.array(
         [lim.searched if lim.margin is Margin.NONE_FOUND else math.nan for lim in limits]
     )
-    axes.plot(x, tried * _MILLI, '^', color=SAFE, ms=6, label='none lasts up to here')
+    for impulses, style, colour, said in (
+        (np.abs(shown), 'o-', SEATED, 'smallest lasting knock'),
+        (linear, '-', OPEN, 'below: dies out for sure'),
+        (tried, '^', SAFE, 'none lasts up to here'),
+    ):
+        if np.isfinite(impulses).any():
+            axes.plot(x, impulses * scale.factor, style, color=colour, lw=1.2, ms=5, label=said)
     unstable = np.array([limit.margin is Margin.UNSTABLE for limit in limits])
     half = 0.5 * np.diff(x).min() if x.size > 1 else 0.5
     for k, place in enumerate(x[unstable].tolist()):
@@ -106,14 +125,15 @@ def _draw_curves(axes: Axes, knocks: KnockMap) -> None:
     axes.set_yscale('log')
     axes.set_xlim(min(values) * factor - half, max(values) * factor + half)
     axes.set_xlabel(label)
-    axes.set_ylabel('impulse on the tool / (mN s)')
+    axes.set_ylabel(f'impulse on the tool / ({scale.unit})')
     first = points[0] if points else Point(of.speeds[0], of.depths[0], of.clearances[0])
     parts = {
         'spindle_speed_rpm': f'{first.spindle_speed_rpm:g} rev/min',
         'depth_of_cut': f'{first.depth_of_cut * _MILLI:g} mm',
-        'bearing_clearance': f'clearance {first.bearing_clearance * _MICRO:g} µm',
     }
+    cut = of.config.cut.with_changes(bearing_clearance=first.bearing_clearance)
     fixed = ', '.join(text for key, text in parts.items() if key != name)
+    fixed += f', {bearing_text(cut)}' if name != 'bearing_clearance' else ''
     axes.set_title(f'The knock that a cut survives: {fixed}', size=11)
     axes.legend(fontsize=9)
     grid(axes)

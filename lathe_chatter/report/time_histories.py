@@ -21,6 +21,7 @@ from lathe_chatter.plot_style import (
     draw_band,
     grid,
     scale_for,
+    text_of,
     widen,
 )
 from lathe_chatter.report.run_history import History
@@ -178,7 +179,7 @@ def _label_changes(axes: Axes, history: History) -> None:
         for change in history.changes
     ]
     labels += [
-        (knock.time, f'knock {knock.impulse * 1e3:g} mN s', 'k') for knock in history.knocks
+        (knock.time, f'knock {text_of(knock.impulse, "N s")}', 'k') for knock in history.knocks
     ]
     labels += [(session.time, session.why, 'k') for session in history.later_sessions]
     spans = history.chatter_spans()

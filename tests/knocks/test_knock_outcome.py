@@ -8,7 +8,8 @@ import pytest
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import follow_knock, linear_reach, resting_state
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model import BearingContact, Cut, Machine, Mode
+from lathe_chatter.model.machine_file import load_machine
 
 MACHINE = Machine()
 CUTS = [
@@ -51,6 +52,47 @@ def test_the_known_chatter_is_met_by_knocks_between_two_others(
         assert outcome.amplitude == pytest.approx(41.9e-6, abs=0.05e-6)
 
 
+HEAVY = Machine(Mode(3e3, 314.0, 0.04), Mode(4e4, 138.0, 0.04), 2e9, 2e9)
+LIGHT = Machine(Mode(4e-3, 31400.0, 0.02), Mode(9e-3, 20100.0, 0.02), 0.0, 8e8)
+SHAFT = load_machine('chucked_shaft')
+
+
+@pytest.mark.parametrize(
+    ('machine', 'cut'),
+    [
+        (HEAVY, Cut(30.0, 0.011, 2e-4, feed_per_revolution=6e-3)),
+        (HEAVY, Cut(30.0, 0.011, 5e-5, feed_per_revolution=6e-3)),
+        (LIGHT, Cut(9e4, 1e-4, bearing_contact=BearingContact.NONE, feed_per_revolution=5e-6)),
+        (SHAFT.machine, SHAFT.cut),
+        (SHAFT.machine, SHAFT.cut.with_changes(bearing_clearance=1e-6)),
+    ],
+    ids=['heavy', 'heavy, seated', 'light', 'shaft', 'shaft, seated'],
+)
+def test_machines_of_any_size_and_several_modes_are_knocked_where_they_rest(
+    machine: Machine, cut: Cut
+) -> None:
+    rest = resting_state(machine, cut)
+    lathe = VirtualLathe(machine, cut, sample_rate=1e5, initial_state=rest)
+    for _ in range(40 if len(machine.workpiece.modes) > 1 else 1):
+        samples = lathe.advance(20_000)  # a body of several modes settles, see `resting_state`
+    assert samples[-1, 2:6] == pytest.approx(rest, abs=1e-6 * cut.feed)
+    settled = lathe.snapshot()
+    forward, _ = linear_reach(machine, cut)
+    for share, expected in ((0.995, False), (1.005, True)):
+        lathe.restore(settled)
+        lathe.knock(share * forward)
+        lathe.advance(200_000)
+        assert bool(lathe.events) == expected
+    assert not follow_knock(machine, cut, 0.9 * forward).lasts
+
+
+def test_a_spindle_that_turns_slowly_is_followed_for_enough_turns() -> None:
+    cut = Cut(6.0, 4e-4, bearing_contact=BearingContact.NONE)
+    outcome = follow_knock(MACHINE, cut, 1e-3)
+    assert not outcome.lasts
+    assert outcome.time >= 2 * 5 * cut.delay
+
+
 def test_without_a_feed_there_is_nothing_to_thin() -> None:
-    with pytest.raises(ParameterError, match='feed_speed is 0'):
+    with pytest.raises(ParameterError, match='feed is 0'):
         linear_reach(MACHINE, Cut(feed_speed=0.0))

@@ -314,7 +314,7 @@ def test_a_mass_too_small_for_any_step_is_refused() -> None:
         VirtualLathe(Machine(tool=Mode(1e-20, 775.0, 0.05)), Cut(3000.0, 1e-3))
 
 
-@pytest.mark.parametrize('impulse', [math.nan, math.inf, 1e4, '1'])
+@pytest.mark.parametrize('impulse', [math.nan, math.inf, 1e7, '1'])
 def test_a_wrong_knock_is_refused_and_does_nothing(impulse: Any) -> None:
     lathe = VirtualLathe()
     before = lathe.snapshot()
