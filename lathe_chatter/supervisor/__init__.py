@@ -1,0 +1,8 @@
+"""What to do about chatter, when, and when to leave it alone; no ROS."""
+
+from __future__ import annotations
+
+from lathe_chatter.supervisor.moves import Limits, Move, moves_for
+from lathe_chatter.supervisor.supervisor import Action, Mode, Seen, Supervisor
+
+__all__ = ['Action', 'Limits', 'Mode', 'Move', 'Seen', 'Supervisor', 'moves_for']

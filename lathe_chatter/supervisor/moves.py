@@ -1,0 +1,287 @@
+"""The moves that end chatter within limits: another speed, a varied speed, a smaller cut."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.quantities import check_fields, limits_of, quantity
+from lathe_chatter.stability import (
+    ProcessDamping,
+    contact_at,
+    critical_depth,
+    floquet,
+    rightmost_root,
+    rightmost_roots,
+    seating_depth,
+    stable_speed_intervals,
+)
+
+_RESERVES = (0.12, 0.04)
+"""Parts by which a deeper cut must be stable still, wished and needed."""
+_EDGE, _LEAST_EDGE = 0.04, 0.012
+"""Parts of a speed that it stays away from the edges of its stable speeds, wished and needed."""
+_DEPTHS = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5, 0.4, 0.3, 0.2, 0.1)
+_SHORT_WAY = 0.05
+"""Part of the removal rate that a speed e times as far away has to be worth."""
+_SURE_DECAY = -1.0
+"""Growth rate below which a varied speed is believed to help, 1/s."""
+_WAY = 24
+"""Speeds on the way to another one that are looked at."""
+
+
+def _speed(meaning: str, default: float) -> float:
+    limits = limits_of(Cut, 'spindle_speed_rpm')
+    speed: float = quantity(meaning, 'rev/min', default=default, low=limits.low, high=limits.high)
+    return speed
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What nothing overrides.
+
+    Raises:
+        ParameterError: If a value is outside its own limits, or there is no speed left.
+    """
+
+    slowest_speed: float = _speed('slowest spindle speed to go to', 1000.0)
+    fastest_speed: float = _speed('fastest spindle speed to go to', 12000.0)
+    ramp: float = quantity(
+        'change of the spindle speed at most, by a move and by a variation',
+        'rev/min per s', default=5000.0, low=1.0, high=1e6,
+    )  # fmt: skip
+    smallest_depth: float = quantity('smallest depth of cut to go to', 'm', default=1e-4, high=0.1)
+    smallest_feed: float = quantity(
+        'smallest feed per revolution to go to', 'm', default=1e-5, high=0.01
+    )
+    largest_variation: float = quantity(
+        'largest amplitude of a speed variation, fraction of the speed; 0: none',
+        default=0.2, high=0.5,
+    )  # fmt: skip
+    amplitude_limit: float = quantity(
+        'vibration of the tool beyond which growing chatter is stopped, and none goes on its way',
+        'm', default=5e-4, high=0.1, exclusive=True,
+    )  # fmt: skip
+    most_moves: float = quantity('moves by itself against one chatter', default=3.0, high=100.0)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        check_fields(self)
+        if not self.slowest_speed < self.fastest_speed:
+            allowed = f'above slowest_speed, which is {self.slowest_speed:g} rev/min'
+            raise ParameterError('fastest_speed', self.fastest_speed, 'rev/min', allowed)
+
+
+@dataclass(frozen=True)
+class Move:
+    """Another cut.
+
+    Attributes:
+        cut: To go to.
+        growth_rate: Predicted there, the greater one of open and seated where both may be, 1/s.
+        margin: By what fraction its depth may still grow; nan where the speed varies.
+        kept: Of the removal rate, 1 for all.
+        worth: What moves are compared by.
+    """
+
+    cut: Cut
+    growth_rate: float
+    margin: float
+    kept: float
+    worth: float
+
+    def changes_from(self, cut: Cut) -> dict[str, float]:
+        """What has to be set, by name."""
+        names = (
+            *('spindle_speed_rpm', 'depth_of_cut', 'feed_speed', 'feed_per_revolution'),
+            *('speed_variation_amplitude', 'speed_variation_frequency'),
+        )
+        return {n: getattr(self.cut, n) for n in names if getattr(self.cut, n) != getattr(cut, n)}
+
+
+def removal_rate(cut: Cut) -> float:
+    """Depth times the speed of the feed, m2/s: in turning the volume is pi D times that."""
+    return cut.depth_of_cut * cut.feed * cut.spindle_speed_rpm / 60.0
+
+
+def growth_of(machine: Machine, cut: Cut, contacts: tuple[bool, ...]) -> float:
+    """The greatest predicted growth rate in some contacts (seated or not), 1/s."""
+    if cut.speed_variation_amplitude:
+        return max(floquet(machine, cut, seated=s).growth_rate for s in contacts)
+    at = cut.spindle_speed_rpm, cut.depth_of_cut
+    process = ProcessDamping.of(cut)
+    roots = [rightmost_root(machine, *at, seated=s, process=process) for s in contacts]
+    return max(root.real for root in roots)
+
+
+def contacts_of(cut: Cut) -> tuple[bool, ...]:
+    """Whether the workpiece may float (False), be seated (True), or both in turn."""
+    if cut.bearing_contact is BearingContact.NONE:
+        return (False,)
+    return (True,) if cut.bearing_contact is BearingContact.SEATED else (False, True)
+
+
+def moves_for(machine: Machine, cut: Cut, limits: Limits, amplitude: float = 0.0) -> list[Move]:
+    """Moves that are predicted to end chatter, the one of greatest worth first.
+
+    A cut that chatters across a clearance is open and seated in turn, so a move suits both where
+    one does; else the contact that the mean force makes.
+
+    Args:
+        machine: As known, with C as known or heard.
+        cut: The present one.
+        limits: That no move leaves.
+        amplitude: Of the vibration now, m: it must not pass its limit on the way.
+    """
+    process = ProcessDamping.of(cut)
+    found: list[Move] = []
+    both = contacts_of(cut)
+    for contacts in dict.fromkeys((both, *((each,) for each in both))):
+        for reserve in _RESERVES:
+            search = _Search(machine, cut, limits, amplitude, process, contacts, reserve)
+            found += search.constant_speeds()
+            if not any(move.kept > 0.99 for move in found):
+                found += [*search.varied_speeds(), *search.smaller_feeds()]
+            if found:
+                found.sort(key=lambda move: -move.worth)
+                return found
+    return found
+
+
+@dataclass(frozen=True)
+class _Search:
+    """A cut for which another is looked for, that is stable in some contacts with a reserve."""
+
+    machine: Machine
+    cut: Cut
+    limits: Limits
+    amplitude: float
+    process: ProcessDamping
+    contacts: tuple[bool, ...]
+    reserve: float
+
+    def constant_speeds(self) -> list[Move]:
+        """Speeds at the present depth, or at less of it."""
+        found: list[Move] = []
+        for part in _DEPTHS:
+            depth = part * self.cut.depth_of_cut
+            if depth < self.limits.smallest_depth and part < 1.0:
+                break
+            for low, high in self._intervals((1.0 + self.reserve) * depth):
+                rpm, edge = self._inside(low, high)
+                if edge >= _LEAST_EDGE:
+                    changes = {'spindle_speed_rpm': rpm, 'depth_of_cut': depth}
+                    found += self._move(changes, min(edge / _EDGE, 1.0))
+            if any(move.kept >= part - 0.05 for move in found):
+                break
+        return found
+
+    def varied_speeds(self) -> Iterator[Move]:
+        """The largest variations that the spindle can follow, around the present speed."""
+        rpm, largest = self.cut.spindle_speed_rpm, self.limits.largest_variation
+        highest = limits_of(Cut, 'speed_variation_frequency').high
+        for amplitude in (0.5 * largest, largest) if largest else ():
+            low, high = rpm * (1.0 - amplitude), rpm * (1.0 + amplitude)
+            if self.limits.slowest_speed <= low and high <= self.limits.fastest_speed:
+                frequency = self.limits.ramp / (2.0 * math.pi * amplitude * rpm)
+                yield from self._move(
+                    {
+                        'speed_variation_amplitude': amplitude,
+                        'speed_variation_frequency': min(frequency, 0.1 * highest),
+                    },
+                    0.9,
+                )
+
+    def smaller_feeds(self) -> Iterator[Move]:
+        """The largest feed at which the mean force leaves the workpiece floating."""
+        cut = self.cut
+        if self.contacts != (False,) or cut.bearing_contact is BearingContact.NONE:
+            return
+        seats = seating_depth(self.machine, cut.bearing_clearance, cut.feed)
+        part = seats / cut.depth_of_cut / (1.0 + 2.0 * self.reserve)
+        if part < 1.0 and part * cut.feed >= self.limits.smallest_feed:
+            name = 'feed_per_revolution' if cut.feed_per_revolution else 'feed_speed'
+            yield from self._move({name: part * getattr(cut, name)}, 0.8)
+
+    def _intervals(self, depth: float) -> Array:
+        """The speeds at which a depth is stable in all contacts (n, 2), rev/min."""
+        common = np.array([[self.limits.slowest_speed, self.limits.fastest_speed]])
+        for seated in self.contacts:
+            found = stable_speed_intervals(
+                self.machine, depth, seated=seated, process=self.process,
+                low_rpm=self.limits.slowest_speed, high_rpm=self.limits.fastest_speed,
+            )  # fmt: skip
+            low = np.maximum(common[:, None, 0], found[None, :, 0]).ravel()
+            high = np.minimum(common[:, None, 1], found[None, :, 1]).ravel()
+            common = np.stack((low, high), axis=1)[low < high]
+        return common
+
+    def _inside(self, low: float, high: float) -> tuple[float, float]:
+        """The speed of an interval that is nearest to the present one, and its relative edge."""
+        ends = (low, high)
+        if low > self.limits.slowest_speed:
+            ends = (low * (1.0 + _EDGE), high)
+        if high < self.limits.fastest_speed:
+            ends = (ends[0], high * (1.0 - _EDGE))
+        if ends[0] >= ends[1]:
+            return 0.5 * (low + high), (high - low) / (high + low)
+        return float(min(max(self.cut.spindle_speed_rpm, ends[0]), ends[1])), _EDGE
+
+    def _move(self, changes: dict[str, float], sureness: float) -> Iterator[Move]:
+        """A move to a changed cut, if it is stable there, and on the way."""
+        new = self.cut.with_changes(**changes)
+        deeper = new.with_changes(depth_of_cut=(1.0 + self.reserve) * new.depth_of_cut)
+        varied = new.speed_variation_amplitude > 0.0
+        if len(self.contacts) < len(contacts_of(new)) and any(
+            contact_at(self.machine, each).seated not in self.contacts for each in (new, deeper)
+        ):
+            return
+        if growth_of(self.machine, deeper, self.contacts) > (_SURE_DECAY if varied else 0.0):
+            return
+        if self.amplitude * self._rise(new) > self.limits.amplitude_limit:
+            return
+        margin = math.nan
+        if not varied:
+            critical = [
+                critical_depth(
+                    self.machine, new.spindle_speed_rpm, seated=each, process=self.process
+                )
+                for each in self.contacts
+            ]
+            margin = min(critical) / new.depth_of_cut - 1.0
+        kept = min(removal_rate(new) / removal_rate(self.cut), 1.0)
+        away = abs(math.log(new.spindle_speed_rpm / self.cut.spindle_speed_rpm))
+        worth = kept * (0.5 + 0.5 * sureness) - _SHORT_WAY * away
+        yield Move(new, growth_of(self.machine, new, self.contacts), margin, kept, worth)
+
+    def _rise(self, new: Cut) -> float:
+        """How many times its amplitude the vibration may grow to while the speed changes."""
+        rpm = self.cut.spindle_speed_rpm, new.spindle_speed_rpm
+        on_the_way = np.linspace(*rpm, _WAY)
+        rates = [
+            rightmost_roots(
+                self.machine, on_the_way, new.depth_of_cut, seated=each, process=self.process,
+                proven=False,
+            ).real
+            for each in self.contacts
+        ]  # fmt: skip
+        lasting = abs(rpm[1] - rpm[0]) / self.limits.ramp / _WAY
+        growth = np.maximum(np.max(rates, axis=0), 0.0).sum() * lasting
+        return math.exp(min(float(growth), 50.0))
+
+
+def heard(machine: Machine, cut: Cut, cutting_stiffness: float) -> Machine:
+    """The machine with the C that is heard, where it is greater than what was told.
+
+    Chatter that leaves the cut makes C w look less than it is, never more.
+    """
+    told = machine.cutting_stiffness(cut.depth_of_cut)
+    if not cutting_stiffness > told > 0.0:
+        return machine
+    return replace(machine, cutting_coefficient=cutting_stiffness / cut.depth_of_cut)

@@ -1,0 +1,345 @@
+"""`Supervisor`: what is seen goes in, one sentence and some changes come out."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.supervisor.moves import Limits, Move, heard, moves_for
+
+_SETTLING = 0.5
+"""s from a move to the judgement whether the vibration falls, and from that to the next."""
+_FALLING = 0.9
+"""Part to which the vibration must have fallen meanwhile, where chatter is said to die."""
+_FALLEN = 0.5
+"""Part of what it was at the move, to which it must have fallen where it falls no more."""
+_BEYOND = 0.2
+"""s that vibration must be beyond its limit, and not fall, for a stop."""
+_STEP = 0.02
+"""s from one speed of a ramp to the next."""
+_LASTING = 1.0
+"""s that a margin must lie below its limit."""
+_SAME = 0.01
+"""Part by which cuts must differ of which one was tried."""
+_DOUBT = 1.1
+"""Times its C w that a cut is taken to have for every move that was no cure."""
+
+
+class Mode(str, Enum):
+    """Whether it only says what it would do, waits for `~/accept`, or acts."""
+
+    SHADOW = 'shadow'
+    ASK = 'ask'
+    ACT = 'act'
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is known at a time; nan where something is not.
+
+    Attributes:
+        time: Of a clock that nobody sets, s.
+        cut: As the lathe has it.
+        chatter: The monitor's flag.
+        growth_rate: 1/s.
+        frequency: Hz.
+        amplitude: Of the tool, m.
+        margin: By what fraction the depth may grow.
+        cutting_stiffness: C w as the monitor identified it, N/m.
+        spindle_acceleration: At which the spindle follows a change, rev/min per s; 0: at once.
+        hindrance: Why nothing may be done, as the end of a sentence; empty where it may.
+    """
+
+    time: float
+    cut: Cut
+    chatter: bool = False
+    growth_rate: float = math.nan
+    frequency: float = math.nan
+    amplitude: float = math.nan
+    margin: float = math.nan
+    cutting_stiffness: float = math.nan
+    spindle_acceleration: float = 0.0
+    hindrance: str = ''
+
+
+@dataclass(frozen=True)
+class Action:
+    """What is said, and what is done.
+
+    Attributes:
+        sentence: For people; empty for a step of a ramp.
+        changes: Parameters of the lathe to set together.
+        stop: Whether the lathe is to be paused.
+    """
+
+    sentence: str = ''
+    changes: Mapping[str, float] = field(default_factory=dict)
+    stop: bool = False
+
+
+@dataclass(frozen=True)
+class _Ramp:
+    """The spindle is on its way."""
+
+    start: float
+    target: float
+    began: float
+
+
+class Supervisor:
+    """Decides about one machine.
+
+    Args:
+        limits: That nothing overrides.
+        mode: See `Mode`.
+        margin_limit: Margin below which it warns.
+        move_early: Whether it also moves then, in the mode `act`.
+        hands_off: s without any action after a person has changed something.
+
+    Attributes:
+        machine: As told; None where none is known or it does not fit: then nothing is done.
+        moves: Made by itself against the present chatter.
+    """
+
+    def __init__(
+        self,
+        limits: Limits,
+        mode: Mode = Mode.SHADOW,
+        *,
+        margin_limit: float = 0.1,
+        move_early: bool = False,
+        hands_off: float = 2.0,
+    ) -> None:
+        """See nothing yet."""
+        self.machine: Machine | None = None
+        self.limits, self.mode = limits, mode
+        self._margin_limit, self._move_early, self._hands_off = margin_limit, move_early, hands_off
+        self._hand_at = -math.inf
+        self._levels: deque[tuple[float, float]] = deque()
+        self._safe_since = math.nan
+        self._warned = False
+        self._forget()
+
+    def _forget(self) -> None:
+        """There is no chatter."""
+        self.moves = 0
+        self._alarm_at = math.nan
+        self._tried: list[Cut] = []
+        self._offer: tuple[Cut, Action, float] | None = None
+        self._ramp: _Ramp | None = None
+        self._next_step = self._judge_at = -math.inf
+        self._at_move = math.nan
+        self._refusal = self._said = ''
+
+    def hand_moved(self, time: float) -> Action | None:
+        """Somebody else has changed something: hands off, and what was planned is forgotten."""
+        self._hand_at, on_the_way = time, self._ramp is not None
+        self._offer = self._ramp = None
+        self._refusal = ''
+        if not on_the_way:
+            return None
+        return Action('Somebody else changes the cut: the speed stays where it is on its way.')
+
+    def refused(self, reason: str) -> Action:
+        """The lathe did not do what was asked: no more is tried against this chatter."""
+        self._ramp = self._offer = None
+        self._refusal = f'the lathe refused: {reason.rstrip(".")}'
+        return Action(f'Nothing more is done, for {self._refusal}.')
+
+    def accept(self, seen: Seen) -> tuple[bool, str, Action | None]:
+        """A person says yes to the offer: whether there is one, why not, and what is done."""
+        if self._offer is None:
+            return False, 'Nothing is waiting to be accepted.', None
+        cut, action, _ = self._offer
+        hindrance = self._hindrance(seen)
+        if hindrance or cut != seen.cut:
+            self._offer = None
+            return False, f'Nothing is done, for {hindrance or "the cut has changed"}.', None
+        return True, action.sentence, self._begin(action, seen)
+
+    def look(self, seen: Seen) -> Action | None:
+        """What is to be said or done now; to be called some fifty times a second."""
+        self._levels.append((seen.time, seen.amplitude))
+        while self._levels[0][0] < seen.time - _SETTLING:
+            self._levels.popleft()
+        if self._ramp is not None:
+            return self._go_on(seen)
+        if seen.chatter:
+            return self._chatter(seen)
+        return self._quiet(seen)
+
+    # -- chatter -----------------------------------------------------------------------------
+
+    def _chatter(self, seen: Seen) -> Action | None:
+        if math.isnan(self._alarm_at):
+            self._alarm_at = seen.time
+        if self._offer is not None and self._offer[0] != seen.cut:
+            self._offer = None
+        if hindrance := self._hindrance(seen):
+            self._offer = None
+            return self._once(f'{_figures(seen)}: nothing is done, for {hindrance}.')
+        if self._is_beyond(seen):
+            limit = f'beyond amplitude_limit, {1e6 * self.limits.amplitude_limit:.0f} um'
+            return self._decide(seen, Action(f'{_figures(seen)}, {limit}: {{}} stop', stop=True))
+        if seen.time < self._judge_at or self._offer is not None:
+            return None
+        if self.moves and self._dies(seen):
+            self._judge_at = seen.time + _SETTLING
+            return None
+        return self._move(seen, _figures(seen))
+
+    def _move(self, seen: Seen, why: str) -> Action | None:
+        """The best move that was not tried."""
+        if self.machine is None:
+            return None
+        machine = heard(self.machine, seen.cut, seen.cutting_stiffness)
+        doubt = _DOUBT**self.moves
+        machine = replace(machine, cutting_coefficient=doubt * machine.cutting_coefficient)
+        amplitude = seen.amplitude if math.isfinite(seen.amplitude) else 0.0
+        for move in moves_for(machine, seen.cut, self.limits, amplitude):
+            if not any(_same(move.cut, cut) for cut in self._tried):
+                changes = move.changes_from(seen.cut)
+                said = f'{why}: {{}} set {_changes(changes, seen.cut)} ({_expected(move)})'
+                return self._decide(seen, Action(said, changes), move.cut)
+        nothing = 'no cut within the limits is predicted to be stable, and none was left to try'
+        return self._once(f'{why}: {nothing}; a person has to decide.')
+
+    def _decide(self, seen: Seen, action: Action, cut: Cut | None = None) -> Action | None:
+        """Act, or say what would be done, as the mode has it."""
+        out_of_moves = self.moves >= self.limits.most_moves and not action.stop
+        if self.mode is Mode.ACT and not out_of_moves:
+            self._tried += [cut] if cut is not None else []
+            return self._begin(replace(action, sentence=action.sentence.format('I') + '.'), seen)
+        offered = replace(action, sentence=action.sentence.format('I') + ', as was accepted.')
+        if self.mode is Mode.SHADOW:
+            self._offer = None
+            return self._once(action.sentence.format('I would') + ', but only watch.')
+        self._offer = seen.cut, offered, seen.time
+        self._tried += [cut] if cut is not None else []
+        spent = f' {self.moves} moves were no cure.' if out_of_moves and self.moves else ''
+        return self._once(action.sentence.format('I would') + f': ~/accept does it.{spent}')
+
+    def _begin(self, action: Action, seen: Seen) -> Action:
+        """Do it: at once, or the first step of a ramp."""
+        self._offer, self._said = None, ''
+        self.moves += 1
+        changes = dict(action.changes)
+        target = changes.get('spindle_speed_rpm')
+        self._at_move = seen.amplitude
+        self._judge_at = math.inf if action.stop else seen.time + _SETTLING
+        if target is None:
+            return action
+        start, own = seen.cut.spindle_speed_rpm, seen.spindle_acceleration
+        if 0.0 < own <= self.limits.ramp:  # the spindle ramps by itself
+            self._judge_at += abs(target - start) / own
+            return action
+        self._ramp = _Ramp(start, target, seen.time)
+        self._next_step = seen.time
+        first = self._go_on(seen)
+        changes |= first.changes if first is not None else {}
+        return replace(action, changes=changes)
+
+    def _go_on(self, seen: Seen) -> Action | None:
+        """The next speed of the ramp, if it is due."""
+        ramp = self._ramp
+        if ramp is None or seen.time < self._next_step:
+            return None
+        self._next_step = seen.time + _STEP
+        gone = self.limits.ramp * (seen.time - ramp.began + _STEP)
+        left = ramp.target - ramp.start
+        rpm = ramp.start + math.copysign(min(gone, abs(left)), left)
+        if gone >= abs(left):
+            self._ramp, rpm = None, ramp.target
+            self._judge_at = seen.time + _SETTLING
+        return Action(changes={'spindle_speed_rpm': rpm})
+
+    def _hindrance(self, seen: Seen) -> str:
+        """Why nothing may be done."""
+        if seen.hindrance or self._refusal:
+            return seen.hindrance or self._refusal
+        if self.machine is None:
+            return 'the machine is not known, or does not fit what is heard'
+        if seen.time < self._hand_at + self._hands_off:
+            return 'somebody else has just changed something'
+        return ''
+
+    # -- no chatter --------------------------------------------------------------------------
+
+    def _quiet(self, seen: Seen) -> Action | None:
+        """Say that it is over, and watch the margin."""
+        if not math.isnan(self._alarm_at):
+            lasted, moves = seen.time - self._alarm_at, self.moves
+            self._forget()
+            word = 'move' if moves == 1 else 'moves'
+            return Action(f'The chatter has ended, {lasted:.1f} s after the flag; {moves} {word}.')
+        low = seen.margin < self._margin_limit
+        if not low:
+            self._safe_since = math.nan
+            self._warned &= not seen.margin > 1.5 * self._margin_limit
+            return None
+        if math.isnan(self._safe_since):
+            self._safe_since = seen.time
+        if self._warned or seen.time < self._safe_since + _LASTING:
+            return None
+        self._warned = True
+        limit = f'margin_limit, {100.0 * self._margin_limit:.0f} %'
+        why = f'The depth may grow by {100.0 * seen.margin:.0f} % only, less than {limit}'
+        if not self._move_early or self._hindrance(seen):
+            return Action(f'{why}.')
+        return self._move(seen, why)
+
+    # -- words -------------------------------------------------------------------------------
+
+    def _once(self, sentence: str) -> Action | None:
+        """A sentence, unless the same was the last one: figures do not make it another."""
+        kind = ''.join(letter for letter in sentence if not (letter.isdigit() or letter in '.-+'))
+        if kind == self._said:
+            return None
+        self._said = kind
+        return Action(sentence)
+
+    def _dies(self, seen: Seen) -> bool:
+        """Whether the vibration falls, or has fallen since the move and grows no more."""
+        if seen.amplitude < _FALLING * self._levels[0][1]:
+            return True
+        return seen.amplitude < _FALLEN * self._at_move and not seen.growth_rate > 0.0
+
+    def _is_beyond(self, seen: Seen) -> bool:
+        """Whether the vibration is beyond its limit, and stays there."""
+        recent = [level for time, level in self._levels if time > seen.time - _BEYOND]
+        lasting = self._levels[0][0] <= seen.time - _BEYOND
+        return lasting and min(recent) > self.limits.amplitude_limit and (
+            seen.amplitude > _FALLING * recent[0]
+        )
+
+
+def _same(one: Cut, other: Cut) -> bool:
+    """Whether two cuts are one and the same to a machinist."""
+    pairs = (
+        (getattr(one, name), getattr(other, name))
+        for name in ('spindle_speed_rpm', 'depth_of_cut', 'feed', 'speed_variation_amplitude')
+    )
+    return all(abs(a - b) <= _SAME * abs(b) for a, b in pairs)
+
+
+def _figures(seen: Seen) -> str:
+    known = [
+        (seen.frequency, f'at {seen.frequency:.1f} Hz'),
+        (seen.growth_rate, f'growing at {seen.growth_rate:.1f} 1/s'),
+        (seen.amplitude, f'amplitude {1e6 * seen.amplitude:.3g} um'),
+    ]
+    return 'Chatter ' + (', '.join(text for value, text in known if math.isfinite(value)) or 'flagged')
+
+
+def _changes(changes: Mapping[str, float], cut: Cut) -> str:
+    return ', '.join(f'{n} from {getattr(cut, n):.6g} to {v:.6g}' for n, v in changes.items())
+
+
+def _expected(move: Move) -> str:
+    margin = '' if math.isnan(move.margin) else f', margin {100.0 * move.margin:.0f} %'
+    kept = f'{100.0 * move.kept:.0f} % of the removal rate'
+    return f'predicted: growth {move.growth_rate:.1f} 1/s{margin}, {kept}'
