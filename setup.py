@@ -78,6 +78,7 @@ setup(
             'lathe = lathe_chatter.nodes.entry_points:lathe',
             'chatter_monitor = lathe_chatter.nodes.entry_points:chatter_monitor',
             'run_recorder = lathe_chatter.nodes.entry_points:run_recorder',
+            'chatter_supervisor = lathe_chatter.nodes.entry_points:chatter_supervisor',
             'cell = lathe_chatter.nodes.entry_points:cell',
             'lathe-chatter = lathe_chatter.cli.main:main',
         ],

@@ -23,6 +23,7 @@ def run(program: str, **options: object) -> subprocess.CompletedProcess[str]:
         'from lathe_chatter.nodes.entry_points import lathe; lathe()',
         'from lathe_chatter.nodes.entry_points import chatter_monitor; chatter_monitor()',
         'from lathe_chatter.nodes.entry_points import run_recorder; run_recorder()',
+        'from lathe_chatter.nodes.entry_points import chatter_supervisor; chatter_supervisor()',
     ],
 )
 def test_a_missing_ros_is_said_before_anything_is_compiled(start: str, tmp_path: Path) -> None:

@@ -35,13 +35,15 @@ ARROWS = {
     'stability': {'model'},
     'detection': {'model', 'stability'},
     'knocks': {'model', 'lathe', 'stability'},
+    'supervisor': {'model', 'stability'},
     'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'lathe', 'detection', 'recording'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'nodes': {
-        *('model', 'samples', 'lathe', 'detection', 'recording', 'scenario', 'precompile'),
+        *('model', 'samples', 'lathe', 'detection', 'supervisor', 'recording', 'scenario'),
+        'precompile',
     },
     'cli': {
         *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'precompile'),

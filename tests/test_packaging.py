@@ -19,7 +19,10 @@ from packaging.requirements import Requirement
 import lathe_chatter
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = {'lathe', 'chatter_monitor', 'run_recorder', 'cell', 'lathe-chatter'}
+EXECUTABLES = {
+    *('lathe', 'chatter_monitor', 'run_recorder', 'chatter_supervisor'),
+    *('cell', 'lathe-chatter'),
+}
 OPTIONAL_IN_ROS = {'simulation_interfaces'}
 """Used where they are; no machine needs them."""
 NAMED_OTHERWISE = {'sdypy': 'sdypy-EMA'}

@@ -65,6 +65,7 @@ class Supervised:
     """A supervisor in the mode `act`, told what a node would be told."""
 
     def __init__(self, trial: Trial) -> None:
+        """It has seen nothing."""
         self._supervisor = Supervisor(trial.limits, Mode.ACT)
         self._told = trial.told
         self.said: list[str] = []
@@ -90,10 +91,11 @@ class Rule:
     """60 f/k with the fewest waves a turn that the range allows, again and again."""
 
     def __init__(self, _trial: Trial) -> None:
+        """It has tried nothing."""
         self.said: list[str] = []
         self._next, self._tries = -math.inf, 0
 
-    def __call__(self, time: float, cut: Cut, known: Estimate) -> tuple[Change, bool]:
+    def __call__(self, time: float, _cut: Cut, known: Estimate) -> tuple[Change, bool]:
         """See `Answer`."""
         if not known.chatter:
             return {}, False
@@ -111,6 +113,16 @@ class Rule:
 def nothing(_trial: Trial) -> Answer:
     """No action."""
     return lambda _time, _cut, _known: ({}, False)
+
+
+class _Course(NamedTuple):
+    """Every change of the cut and its time, the alarm's time, vibration, and how it ended."""
+
+    changed: list[tuple[float, Cut]]
+    alarm: float
+    level: list[float]
+    stopped: bool
+    said: tuple[str, ...]
 
 
 def play(trial: Trial, make: Callable[[Trial], Answer]) -> Outcome:
@@ -144,7 +156,8 @@ def play(trial: Trial, make: Callable[[Trial], Answer]) -> Outcome:
         change, stopped = answer(lathe.time, lathe.cut, known)
         if change:
             due.append((lathe.time + _LATENCY, change))
-    return _judged(trial, changed, alarm, level, stopped, tuple(getattr(answer, 'said', ())))
+    said = tuple(getattr(answer, 'said', ()))
+    return _judged(trial, _Course(changed, alarm, level, stopped, said))
 
 
 def _vibration(samples: Array) -> float:
@@ -152,10 +165,8 @@ def _vibration(samples: Array) -> float:
     return float(np.std(samples[:, 2]))
 
 
-def _judged(
-    trial: Trial, changed: list[tuple[float, Cut]], alarm: float, level: list[float],
-    stopped: bool, said: tuple[str, ...],
-) -> Outcome:  # fmt: skip
+def _judged(trial: Trial, course: _Course) -> Outcome:
+    changed, alarm, level, stopped, said = course
     # The steps of one ramp are one move.
     moves = [
         (time, cut)

@@ -11,7 +11,6 @@ import numpy as np
 
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.stability import (
-    contact_at,
     critical_depths,
     floquet,
     rightmost_root,
@@ -60,7 +59,9 @@ class Trial:
         elif cut.bearing_contact is BearingContact.GAP:
             # Inverse to the feed a turn, which may be inverse to the speed.
             feeds = 60.0 * cut.feed_speed / _SCAN
-            feeds = np.full(_SCAN.shape, cut.feed_per_revolution) if cut.feed_per_revolution else feeds
+            feeds = (
+                np.full(_SCAN.shape, cut.feed_per_revolution) if cut.feed_per_revolution else feeds
+            )
             at_one = seating_depth(self.machine, cut.bearing_clearance, 1e-3)
             line = at_one * 1e-3 / feeds
         present = cut.depth_of_cut
@@ -86,9 +87,7 @@ def true_growth(machine: Machine, cut: Cut) -> float:
     seated = _is_seated(machine, cut)
     if cut.speed_variation_amplitude:
         return floquet(machine, cut, seated=seated).growth_rate
-    return rightmost_root(
-        machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
-    ).real
+    return rightmost_root(machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated).real
 
 
 def random_trial(seed: int, off: float = 0.0) -> Trial:
@@ -110,7 +109,9 @@ def random_trial(seed: int, off: float = 0.0) -> Trial:
         **NOISE,
     )
     if rng.integers(2):  # half of the lathes keep the speed of their feed
-        cut = replace(cut, feed_speed=cut.feed_per_revolution * rpm / 60.0, feed_per_revolution=0.0)
+        cut = replace(
+            cut, feed_speed=cut.feed_per_revolution * rpm / 60.0, feed_per_revolution=0.0
+        )
     depth = _limit(machine, cut) * float(rng.uniform(1.1, 1.8))
     cut = cut.with_changes(depth_of_cut=min(depth, 0.01))
     return Trial(machine, _told(machine, rng, off), cut, seed)

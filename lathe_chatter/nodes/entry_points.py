@@ -1,6 +1,6 @@
 """The executables of the nodes, which hear a signal from their first moment on.
 
-    python -m lathe_chatter.nodes.entry_points lathe|chatter_monitor|run_recorder|cell
+    python -m lathe_chatter.nodes.entry_points NODE
 
 Where there is no ROS 2, they say so in a sentence.
 """
@@ -28,6 +28,11 @@ def run_recorder() -> None:
     _run('recorder_node')
 
 
+def chatter_supervisor() -> None:
+    """Run the node `chatter_supervisor`."""
+    _run('supervisor_node')
+
+
 def cell() -> None:
     """Run lathe, monitor and recorder in one process."""
     _run('composition')
@@ -52,6 +57,5 @@ def _run(module: str) -> None:
 
 
 if __name__ == '__main__':
-    {each.__name__: each for each in (lathe, chatter_monitor, run_recorder, cell)}[
-        sys.argv.pop(1)
-    ]()
+    nodes = (lathe, chatter_monitor, run_recorder, chatter_supervisor, cell)
+    {each.__name__: each for each in nodes}[sys.argv.pop(1)]()

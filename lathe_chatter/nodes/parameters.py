@@ -10,7 +10,7 @@ from enum import Enum
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut
-from lathe_chatter.model.parameter_table import ParameterTable, Resolved, Row, Values
+from lathe_chatter.model.parameter_table import ParameterTable, Resolved, Row, Values, rows_of
 from lathe_chatter.model.parameters import (
     LATHE,
     MACHINE_FILE,
@@ -20,8 +20,9 @@ from lathe_chatter.model.parameters import (
 )
 from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.recording.mcap_chunk import Compression
+from lathe_chatter.supervisor import Limits, Mode
 
-__all__ = ['LATHE', 'MONITOR', 'RECORDER', 'ModelSource']
+__all__ = ['LATHE', 'MONITOR', 'RECORDER', 'SUPERVISOR', 'ModelSource']
 
 _SPEED_RANGE = ('slowest_speed', 'fastest_speed')
 _ADVISED = limits_of(Cut, 'spindle_speed_rpm')
@@ -78,6 +79,7 @@ RECORDED_TOPICS = [
             'margin',
         )
     ),
+    'chatter_supervisor/action',
     '/parameter_events',
     '/rosout',
     '/diagnostics',
@@ -131,3 +133,41 @@ RECORDER = ParameterTable(
     )
 )
 """Node `run_recorder`."""
+
+
+def _checked_limits(given: Values) -> Resolved:
+    """Nothing follows from them, but they have to agree."""
+    Limits(**{name: given[name] for name in Limits.__dataclass_fields__ if name in given})  # type: ignore[arg-type]  # checked numbers
+    return {}
+
+
+SUPERVISOR = ParameterTable(
+    (
+        Row(
+            'mode', Mode.SHADOW.value, (Mode.__doc__ or '').rstrip('.'), None, Mode, run_time=True
+        ),
+        *rows_of(Limits(), run_time=True),
+        Row(
+            'hands_off',
+            2.0,
+            'seconds without any action after somebody else has changed something',
+            Quantity('', 's', high=3600.0),
+            run_time=True,
+        ),
+        Row(
+            'margin_limit',
+            0.1,
+            'margin of the depth of cut below which it warns',
+            Quantity('', low=-1.0, high=10.0),
+            run_time=True,
+        ),
+        Row(
+            'move_early',
+            default=False,
+            meaning='whether, in the mode `act`, it moves then too, before there is chatter',
+            run_time=True,
+        ),
+    ),
+    _checked_limits,
+)
+"""Node `chatter_supervisor`."""

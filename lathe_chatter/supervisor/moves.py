@@ -231,7 +231,8 @@ class _Search:
             ends = (ends[0], high * (1.0 - _EDGE))
         if ends[0] >= ends[1]:
             return 0.5 * (low + high), (high - low) / (high + low)
-        return float(min(max(self.cut.spindle_speed_rpm, ends[0]), ends[1])), _EDGE
+        # As a machinist would set it.
+        return float(round(min(max(self.cut.spindle_speed_rpm, ends[0]), ends[1]))), _EDGE
 
     def _move(self, changes: dict[str, float], sureness: float) -> Iterator[Move]:
         """A move to a changed cut, if it is stable there, and on the way."""

@@ -312,8 +312,10 @@ class Supervisor:
         """Whether the vibration is beyond its limit, and stays there."""
         recent = [level for time, level in self._levels if time > seen.time - _BEYOND]
         lasting = self._levels[0][0] <= seen.time - _BEYOND
-        return lasting and min(recent) > self.limits.amplitude_limit and (
-            seen.amplitude > _FALLING * recent[0]
+        return (
+            lasting
+            and min(recent) > self.limits.amplitude_limit
+            and (seen.amplitude > _FALLING * recent[0])
         )
 
 
@@ -332,7 +334,9 @@ def _figures(seen: Seen) -> str:
         (seen.growth_rate, f'growing at {seen.growth_rate:.1f} 1/s'),
         (seen.amplitude, f'amplitude {1e6 * seen.amplitude:.3g} um'),
     ]
-    return 'Chatter ' + (', '.join(text for value, text in known if math.isfinite(value)) or 'flagged')
+    return 'Chatter ' + (
+        ', '.join(text for value, text in known if math.isfinite(value)) or 'flagged'
+    )
 
 
 def _changes(changes: Mapping[str, float], cut: Cut) -> str:

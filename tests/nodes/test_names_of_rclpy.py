@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 import lathe_chatter.nodes
 
-BASES = {'Node', 'ParameterNode', 'LatheNode', 'RecorderNode', 'MonitorNode'}
+BASES = {'Node', 'ParameterNode', 'LatheNode', 'RecorderNode', 'MonitorNode', 'SupervisorNode'}
 MODULES = sorted(Path(lathe_chatter.nodes.__file__).parent.rglob('*.py'))
 
 

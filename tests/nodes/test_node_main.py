@@ -128,7 +128,9 @@ def hears(process: subprocess.Popen[str]) -> bool:
 @pytest.mark.usefixtures('domain')
 @pytest.mark.skipif(sys.platform != 'linux', reason='/proc tells which signals are heard')
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize('node', ['lathe', 'chatter_monitor', 'run_recorder', 'cell'])
+@pytest.mark.parametrize(
+    'node', ['lathe', 'chatter_monitor', 'run_recorder', 'chatter_supervisor', 'cell']
+)
 def test_a_signal_while_it_starts_ends_a_node_without_a_word(
     node: str,
     number: signal.Signals,

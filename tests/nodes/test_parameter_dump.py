@@ -17,8 +17,14 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.recorder_node import RecorderNode
+from lathe_chatter.nodes.supervisor_node import SupervisorNode
 
-NODES = {'lathe': LatheNode, 'chatter_monitor': MonitorNode, 'run_recorder': RecorderNode}
+NODES = {
+    'lathe': LatheNode,
+    'chatter_monitor': MonitorNode,
+    'run_recorder': RecorderNode,
+    'chatter_supervisor': SupervisorNode,
+}
 
 
 def dump(bench: Bench, node: str) -> dict[str, Any]:

@@ -1,0 +1,306 @@
+"""Node `chatter_supervisor`: acts on chatter through public topics, parameters and services."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.clock import Clock, ClockType
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Bool, Float64, String
+from std_srvs.srv import SetBool, Trigger
+
+from lathe_chatter.detection.estimate import Mode as Works
+from lathe_chatter.errors import LatheChatterError, ParameterError
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.parameter_table import Value
+from lathe_chatter.model.parameters import cut_from, machine_from
+from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.node_main import run_node
+from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameters import SUPERVISOR, ModelSource
+from lathe_chatter.nodes.qos_overrides import publisher_overrides
+from lathe_chatter.nodes.remote_parameters import RemoteParameters
+from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
+
+_LOOK_PERIOD = 0.02
+_SILENCE = 1.0
+"""s without a word of the monitor after which it is taken for silent."""
+_LOSS = 2.0
+"""s after lost samples in which nothing is done."""
+_NO_ANSWER = 2.0
+"""s in which the lathe has to answer."""
+_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'margin')
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_BELIEVED = {Works.FULL.value, Works.CORRECTED.value}
+_LATHE, _MONITOR = 'lathe', 'chatter_monitor'
+
+
+class SupervisorNode(ParameterNode):
+    """Tells a `Supervisor` what it hears, and carries out what that decides.
+
+    It knows the machine as the monitor was told it, and the cut as the lathe has it. It keeps
+    no promise that its own end would break: a lathe whose supervisor was killed cuts on as it is.
+
+    Args:
+        options: As for `rclpy.node.Node`.
+
+    Raises:
+        ParameterError: If a parameter given at the start is not allowed.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Listen, and hold still until it is known who else is there."""
+        super().__init__('chatter_supervisor', SUPERVISOR, **options)
+        moves_for(Machine(), Cut(), Limits())  # compiled or loaded before there is any hurry
+        self._core = self._new_core()
+        self._figures = dict.fromkeys(_FIGURES, math.nan)
+        self._cutting_stiffness = math.nan
+        self._chatter, self._state, self._works = False, '', ''
+        self._heard_at = self._lost_at = -math.inf
+        self._lost = -1
+        self._lathe_values: dict[str, Any] = {}
+        self._sent: dict[str, Any] = {}
+        self._cut: Cut | None = None
+        self._machine: Machine | None = None
+        self._answer: tuple[Any, float] | None = None
+        self._newest = 'nothing was done yet'
+        self._set = self.create_client(SetParametersAtomically, 'lathe/set_parameters_atomically')
+        self._pause = self.create_client(SetBool, 'lathe/pause')
+        self._lathe, self._monitor = (
+            self.resolve_service_name(f'{name}/get_parameters').rpartition('/')[0]
+            for name in (_LATHE, _MONITOR)
+        )
+        self._remote = RemoteParameters(self, self._take_parameters)
+        for name in _FIGURES:
+            self.create_subscription(
+                Float64, f'chatter_monitor/{name}', self._taker(name), QoSProfile(depth=1)
+            )
+        self.create_subscription(Bool, 'chatter_monitor/chatter', self._on_flag, _LATCHED)
+        self.create_subscription(String, 'chatter_monitor/state', self._on_state, _LATCHED)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        self.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
+        topic = '~/action'
+        self._action = self.create_publisher(
+            String, topic, _LATCHED, qos_overriding_options=publisher_overrides(self, topic)
+        )
+        self._diagnostics = Diagnostics(self, 'chatter supervisor')
+        self.create_service(Trigger, '~/accept', self._on_accept)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
+        self.create_timer(1.0, self._report, clock=steady)
+
+    def _refusal(self, parameters: list[Parameter]) -> str:
+        """Also where limits would contradict each other."""
+        given = {p.name: p.value for p in parameters if p.name in self._table}
+        if refusal := super()._refusal(parameters):
+            return refusal
+        try:
+            _limits_of({**self.values, **given})
+        except ParameterError as error:
+            return str(error)
+        return ''
+
+    def _new_core(self) -> Supervisor:
+        values: Mapping[str, Any] = self.values
+        core = Supervisor(
+            _limits_of(values),
+            Mode(values['mode']),
+            margin_limit=values['margin_limit'],
+            move_early=values['move_early'],
+            hands_off=values['hands_off'],
+        )
+        core.hand_moved(time.monotonic())
+        return core
+
+    def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
+        """Begin anew with what was set."""
+        self._core = self._new_core()
+        self._core.machine = self._machine if self._works in _BELIEVED else None
+        self._say(f'From now on: {", ".join(f"{n} = {v}" for n, v in changed.items())}.')
+
+    # -- listening -----------------------------------------------------------------------------
+
+    def _taker(self, name: str) -> Callable[[Float64], None]:
+        def take(message: Float64) -> None:
+            self._figures[name] = message.data
+            self._heard_at = time.monotonic()
+
+        return take
+
+    def _on_flag(self, message: Bool) -> None:
+        self._chatter = message.data
+
+    def _on_state(self, message: String) -> None:
+        self._state, self._heard_at = message.data, time.monotonic()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {value.key: value.value for value in status.values}
+            if status.name == f'{self._monitor}: cut':
+                self._works = values.get('works with', '')
+                self._cutting_stiffness = float(values.get('C w, N/m', math.nan))
+                self._core.machine = self._machine if self._works in _BELIEVED else None
+            elif status.name == f'{self._monitor}: samples' and 'samples lost' in values:
+                lost = int(values['samples lost'])
+                if lost > self._lost >= 0:
+                    self._lost_at = time.monotonic()
+                self._lost = lost
+
+    def _on_event(self, event: ParameterEvent) -> None:
+        """Follow the lathe; what this node has not set somebody else has."""
+        if event.node != self._lathe or not self._lathe_values:
+            return
+        entries = (*event.new_parameters, *event.changed_parameters)
+        values = {p.name: parameter_value_to_python(p.value) for p in entries}
+        changed = {n: v for n, v in values.items() if self._lathe_values.get(n) != v}
+        self._lathe_values |= changed
+        if any(self._sent.get(name) != value for name, value in changed.items()):
+            self._say_of(self._core.hand_moved(time.monotonic()))
+        if changed:
+            self._take_cut()
+
+    def _take_parameters(self, name: str, values: dict[str, Any]) -> None:
+        known = {n: v for n, v in values.items() if v is not None}
+        try:
+            if name == self._lathe:
+                self._lathe_values = known
+                self._take_cut()
+            if name == self._monitor:
+                source = known.get('model')
+                if source == ModelSource.LATHE.value:
+                    self._remote.ask(self._lathe)
+                elif source == ModelSource.PARAMETERS.value:
+                    self._machine = machine_from(known)
+        except LatheChatterError as error:
+            self.get_logger().error(f'{name} does not say what it is: {error}')
+
+    def _take_cut(self) -> None:
+        self._cut = cut_from(self._lathe_values)
+        self._cutting_stiffness = math.nan  # of the cut before
+
+    # -- acting --------------------------------------------------------------------------------
+
+    def _seen(self, cut: Cut) -> Seen:
+        now = time.monotonic()
+        return Seen(
+            now,
+            cut,
+            self._chatter,
+            **self._figures,
+            cutting_stiffness=self._cutting_stiffness,
+            spindle_acceleration=float(self._lathe_values.get('spindle_acceleration', 0.0)),
+            hindrance=self._hindrance(now),
+        )
+
+    def _hindrance(self, now: float) -> str:
+        """Why nothing may be done, as the end of a sentence; empty where it may."""
+        if now > self._heard_at + _SILENCE:
+            return 'nothing comes from the monitor'
+        if self._state == 'unknown':
+            return 'the monitor does not know the state of the cut'
+        if now < self._lost_at + _LOSS:
+            return 'samples were lost'
+        if self.count_publishers('~/action') > 1:
+            return 'there is another supervisor'
+        return '' if self._set.service_is_ready() else 'the lathe cannot be reached'
+
+    def _look(self) -> None:
+        if self._answer is not None:
+            if time.monotonic() > self._answer[1] + _NO_ANSWER:
+                self._answer = None
+                self._say_of(self._core.refused('it does not answer'))
+        elif self._cut is not None:
+            self._do(self._core.look(self._seen(self._cut)))
+
+    def _on_accept(self, _request: Any, response: Any) -> Any:
+        response.message = 'The lathe is not known yet.'
+        if self._cut is not None:
+            done, message, action = self._core.accept(self._seen(self._cut))
+            response.success, response.message = done, message
+            self._do(action)
+        return response
+
+    def _do(self, action: Action | None) -> None:
+        if action is None:
+            return
+        self._say_of(action)
+        if action.stop:
+            self._wait(self._pause.call_async(SetBool.Request(data=True)))
+        elif action.changes:
+            self._sent |= action.changes
+            entries = [Parameter(n, value=v) for n, v in action.changes.items()]
+            request = SetParametersAtomically.Request(
+                parameters=[entry.to_parameter_msg() for entry in entries]
+            )
+            self._wait(self._set.call_async(request), action.changes)
+
+    def _wait(self, future: Any, changes: Mapping[str, float] | None = None) -> None:
+        """Until the lathe has answered; nothing else is decided meanwhile."""
+        self._answer = future, time.monotonic()
+
+        def answered(done: Any) -> None:
+            if self._answer is None or self._answer[0] is not done:
+                return  # given up
+            self._answer = None
+            result = done.result()
+            result = getattr(result, 'result', result)
+            success = getattr(result, 'successful', getattr(result, 'success', False))
+            if not success:
+                reason = getattr(result, 'reason', getattr(result, 'message', ''))
+                self._say_of(self._core.refused(reason))
+            elif changes is not None:
+                self._lathe_values |= changes
+                self._take_cut()
+
+        future.add_done_callback(answered)
+
+    # -- what is said --------------------------------------------------------------------------
+
+    def _say_of(self, action: Action | None) -> None:
+        if action is not None and action.sentence:
+            self._say(action.sentence)
+
+    def _say(self, sentence: str) -> None:
+        self._newest = sentence
+        self.get_logger().info(sentence)
+        self._action.publish(String(data=sentence))
+        self._diagnostics.publish(self._statuses())
+
+    def _report(self) -> None:
+        """Once a second."""
+        self._remote.ask(self._lathe)
+        self._remote.ask(self._monitor)
+        self._remote.look()
+        self._diagnostics.publish(self._statuses())
+
+    def _statuses(self) -> list[Status]:
+        hindrance = self._hindrance(time.monotonic())
+        if self._core.machine is None:
+            hindrance = hindrance or 'the machine is not known, or does not fit what is heard'
+        values = {
+            'mode': self._core.mode.value,
+            'moves against the present chatter': self._core.moves,
+            'newest sentence': self._newest,
+        }
+        able = f'nothing can be done: {hindrance}' if hindrance else 'ready'
+        return [Status('action', WARN if hindrance else OK, able, values)]
+
+
+def _limits_of(values: Mapping[str, Any]) -> Limits:
+    return Limits(**{name: values[name] for name in Limits.__dataclass_fields__})
+
+
+def main() -> None:
+    """Run the node until it is told to end."""
+    run_node(SupervisorNode, usage=SUPERVISOR.usage('chatter_supervisor'))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,120 @@
+"""The node `chatter_supervisor` beside a real lathe and a real monitor: processes, over DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import GetParameters
+from rclpy.parameter import parameter_value_to_python
+from std_msgs.msg import Bool, String
+from support.node_bench import LATCHED, Bench
+from support.node_processes import NodeProcesses
+
+from lathe_chatter.errors import ParameterError
+from lathe_chatter.nodes.supervisor_node import SupervisorNode
+
+DEEP = 0.001
+"""m: unstable at 3000 rev/min, stable at others."""
+SUPERVISOR, LATHE = '/chatter_supervisor', '/lathe'
+
+
+class Cell:
+    """Lathe, monitor and supervisor, and what is heard of them."""
+
+    def __init__(self, nodes: NodeProcesses, bench: Bench, *parameters: str) -> None:
+        self.nodes, self.bench = nodes, bench
+        nodes.start('chatter_monitor')
+        nodes.start('chatter_supervisor', 'hands_off:=0.5', *parameters)
+        self.flags: list[Bool] = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+        self.said: list[String] = bench.listen(String, f'{SUPERVISOR}/action', LATCHED)
+        self.reports: list[DiagnosticArray] = bench.listen_first(DiagnosticArray, '/diagnostics')
+        nodes.start('lathe', 'depth_of_cut:=0.0003', 'bearing_contact:=none', 'await_readers:=1')
+        bench.spin_until(lambda: self.status() == 'ready', 'a supervisor that knows the machine')
+
+    def status(self) -> str:
+        """The newest of the supervisor."""
+        found = [
+            s.message for m in self.reports for s in m.status if s.name.startswith(SUPERVISOR)
+        ]
+        return found[-1] if found else ''
+
+    def get(self, name: str) -> Any:
+        """A parameter of the lathe."""
+        request = GetParameters.Request(names=[name])
+        answer = self.bench.call(GetParameters, f'{LATHE}/get_parameters', request)
+        return parameter_value_to_python(answer.values[0])
+
+    def heard(self, words: str) -> list[str]:
+        """The sentences that contain some words."""
+        return [message.data for message in self.said if words in message.data]
+
+    def deepen(self) -> None:
+        """As a person would, and chatter comes."""
+        assert self.bench.set_together(LATHE, depth_of_cut=DEEP).successful
+        self.bench.spin_until(lambda: self.flags[-1].data, 'chatter')
+
+    def await_words(self, words: str) -> None:
+        """Until the supervisor has said them."""
+        self.bench.spin_until(lambda: self.heard(words), f'"{words}"')
+
+
+@pytest.fixture
+def cell(nodes: NodeProcesses, bench: Bench) -> Callable[..., Cell]:
+    return lambda *parameters: Cell(nodes, bench, *parameters)
+
+
+def test_chatter_is_cured_and_every_decision_is_said(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=act')
+    there.deepen()
+    there.await_words('The chatter has ended')
+    assert not there.flags[-1].data
+    assert there.get('spindle_speed_rpm') != 3000.0
+    (sentence,) = there.heard('I set')
+    assert all(words in sentence for words in ('growing at', 'predicted: growth -', 'margin'))
+
+
+def test_in_ask_it_waits_until_it_is_accepted(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=ask')
+    assert not there.bench.trigger(f'{SUPERVISOR}/accept').success
+    there.deepen()
+    there.await_words('~/accept does it')
+    assert there.get('spindle_speed_rpm') == 3000.0
+    answer = there.bench.trigger(f'{SUPERVISOR}/accept')
+    assert answer.success, answer.message
+    there.await_words('The chatter has ended')
+    assert there.get('spindle_speed_rpm') != 3000.0
+
+
+def test_in_shadow_it_does_nothing(cell: Callable[..., Cell]) -> None:
+    there = cell()
+    there.deepen()
+    there.await_words('I would set')
+    assert not there.bench.trigger(f'{SUPERVISOR}/accept').success
+    assert (there.get('spindle_speed_rpm'), there.get('depth_of_cut')) == (3000.0, DEEP)
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ({'mode': 'guess'}, 'one of shadow, ask, act'),
+        ({'slowest_speed': 5e3, 'fastest_speed': 4e3}, 'slowest'),
+    ],
+)
+def test_a_wrong_parameter_is_refused_with_a_sentence(
+    start: Callable[..., Any], override: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(ParameterError, match=words):
+        start(SupervisorNode, **override)
+
+
+def test_limits_that_contradict_each_other_are_refused_at_run_time(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    node = start(SupervisorNode)
+    result = bench.set_together(SUPERVISOR, slowest_speed=13000.0)
+    assert not result.successful
+    assert 'fastest_speed' in result.reason
+    assert node.values['slowest_speed'] == 1000.0
