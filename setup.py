@@ -15,7 +15,11 @@ setup(
     name=NAME,
     version=ET.parse(SOURCES / 'package.xml').getroot().findtext('version'),
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed'], f'{NAME}.paper': ['*.j2']},
+    package_data={
+        NAME: ['py.typed'],
+        f'{NAME}.paper': ['*.j2'],
+        f'{NAME}.page': ['static/*'],
+    },
     python_requires='>=3.10,<3.14',
     install_requires=[
         'numpy>=1.26',  # arrays of samples
@@ -32,6 +36,10 @@ setup(
         'mcap>=1.1',  # writes and reads MCAP
         'lz4>=4.0',  # the compression of the chunks of a run
         'zstandard>=0.22',  # that of runs written by others
+        # The operator's page. Ordinary, for a node of the package needs them: 7 MB.
+        'starlette>=0.40',  # routes, files and sockets
+        'uvicorn>=0.35',  # the server
+        'websockets>=13',  # its sockets
         'isal>=1.5',  # the CRCs of a run in a quarter of the time that zlib takes
     ],
     # A run in other hands; each is asked for only where it is used.
@@ -79,6 +87,7 @@ setup(
             'chatter_monitor = lathe_chatter.nodes.entry_points:chatter_monitor',
             'run_recorder = lathe_chatter.nodes.entry_points:run_recorder',
             'chatter_supervisor = lathe_chatter.nodes.entry_points:chatter_supervisor',
+            'operator_page = lathe_chatter.nodes.entry_points:operator_page',
             'cell = lathe_chatter.nodes.entry_points:cell',
             'lathe-chatter = lathe_chatter.cli.main:main',
         ],

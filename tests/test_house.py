@@ -41,9 +41,11 @@ ARROWS = {
     'scenario': {'model', 'lathe', 'detection', 'recording'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
+    'page': {'model', 'samples', 'stability', 'report'},
     'nodes': {
         *('model', 'samples', 'lathe', 'detection', 'supervisor', 'recording', 'scenario'),
         'precompile',
+        'page',
     },
     'cli': {
         *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'precompile'),

@@ -21,6 +21,7 @@ import lathe_chatter
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = {
     *('lathe', 'chatter_monitor', 'run_recorder', 'chatter_supervisor'),
+    'operator_page',
     *('cell', 'lathe-chatter'),
 }
 OPTIONAL_IN_ROS = {'simulation_interfaces'}

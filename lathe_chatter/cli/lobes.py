@@ -32,7 +32,13 @@ from lathe_chatter.report.probability_chart import (
     cut_probability,
     probability_sentence,
 )
-from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_lobes
+from lathe_chatter.report.stability_chart import (
+    chart_limits,
+    chart_speeds,
+    draw_lobes,
+    top_of_chart,
+    usual_speeds,
+)
 from lathe_chatter.stability import GrowthMap, SafeLimit, SpeedLaw, growth_map, lowest_limit
 from lathe_chatter.stability.probability import StabilityProbability, stability_probability
 
@@ -41,15 +47,9 @@ HELP = 'draw the stability chart: both limits, the seating line and the safe reg
 EXAMPLE = 'lathe-chatter lobes --bearing-clearance 1e-5 --map --csv lobes.csv'
 
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
-_USUAL = (0.161, 1.933)
-"""Turns in a period of the most flexible mode, where nothing is said of the spindle: of the
-paper's machine 1000 to 12,000 rev/min."""
-_ABOUT_THE_CUT = 1.25
-"""Ratio of a usual range's ends to the speed of the cut, at least; of its top to the depth."""
 _DEPTH = Quantity(
     'top of the chart', 'm', high=limits_of(Cut, 'depth_of_cut').high, exclusive=True
 )
-_HEADROOM = 2.6
 _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
@@ -114,7 +114,7 @@ def run(options: Namespace) -> int:
         chart_speeds(low, high),
         tool_leaves_cut=config.setup.tool_leaves_cut,
     )
-    top = _top(config.cut, limits) if options.depth_limit is None else options.depth_limit
+    top = top_of_chart(config.cut, limits) if options.depth_limit is None else options.depth_limit
     top = _DEPTH.check('--depth-limit', top)
     screen = Screen(json=options.json)
     kept = options.output.with_suffix('.jsonl')
@@ -156,30 +156,10 @@ def run(options: Namespace) -> int:
 def _speed_range(options: Namespace, config: LatheConfig) -> tuple[float, float]:
     """What is asked for, else the spindle's range, else one that suits the machine, rev/min."""
     spindle = config.described.speed_range if config.described else None
-    low, high = spindle or _usual_range(config)
+    low, high = spindle or usual_speeds(config.machine, config.cut)
     low = low if options.low is None else options.low
     high = high if options.high is None else options.high
     return _SPEED.check('--from', low), _SPEED.check('--to', high)
-
-
-def _usual_range(config: LatheConfig) -> tuple[float, float]:
-    """Some lobes of the most flexible mode, and the cut, rev/min."""
-    modes = (*config.machine.tool.modes, *config.machine.workpiece.modes)
-    flexible = min(modes, key=lambda mode: mode.stiffness)
-    low, high = (
-        float(f'{turns * 60.0 * flexible.natural_frequency / (2.0 * math.pi):.2g}')
-        for turns in _USUAL
-    )
-    speed = config.cut.spindle_speed_rpm
-    low, high = min(low, speed / _ABOUT_THE_CUT), max(high, speed * _ABOUT_THE_CUT)
-    return max(low, _SPEED.low), min(high, _SPEED.high)
-
-
-def _top(cut: Cut, limits: SafeLimit) -> float:
-    """Where a chart may end: some lowest limits up, and above the cut."""
-    lowest = float(np.min(limits.open_limit))
-    deep = _ABOUT_THE_CUT * cut.depth_of_cut
-    return min(max(_HEADROOM * lowest, deep), _DEPTH.high) if math.isfinite(lowest) else 2.0 * deep
 
 
 class _Wide(NamedTuple):

@@ -38,6 +38,11 @@ def cell() -> None:
     _run('composition')
 
 
+def operator_page() -> None:
+    """Run the node `operator_page`."""
+    _run('operator_page_node')
+
+
 def no_ros(error: ImportError) -> str:
     """What to say where a package of ROS 2 cannot be imported."""
     return (
@@ -57,5 +62,5 @@ def _run(module: str) -> None:
 
 
 if __name__ == '__main__':
-    nodes = (lathe, chatter_monitor, run_recorder, chatter_supervisor, cell)
+    nodes = (lathe, chatter_monitor, run_recorder, chatter_supervisor, operator_page, cell)
     {each.__name__: each for each in nodes}[sys.argv.pop(1)]()

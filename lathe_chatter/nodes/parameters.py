@@ -22,7 +22,7 @@ from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.recording.mcap_chunk import Compression
 from lathe_chatter.supervisor import Limits, Mode
 
-__all__ = ['LATHE', 'MONITOR', 'RECORDER', 'SUPERVISOR', 'ModelSource']
+__all__ = ['LATHE', 'MONITOR', 'PAGE', 'RECORDER', 'SUPERVISOR', 'ModelSource']
 
 _SPEED_RANGE = ('slowest_speed', 'fastest_speed')
 _ADVISED = limits_of(Cut, 'spindle_speed_rpm')
@@ -171,3 +171,15 @@ SUPERVISOR = ParameterTable(
     _checked_limits,
 )
 """Node `chatter_supervisor`."""
+
+PAGE = ParameterTable(
+    (
+        Row('host', '127.0.0.1', 'address to serve the page on; others than this machine need a '
+            'token'),
+        Row('port', 8080, 'port to serve the page on; 0: any that is free',
+            Quantity('', high=65535.0)),
+        Row('token', '', 'what viewers who act must know, 16 characters or more; it is not shown '
+            'again'),
+    )
+)  # fmt: skip
+"""Node `operator_page`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.quantities import limits_of
 from lathe_chatter.plot_style import (
     LINE,
     OPEN,
@@ -32,6 +34,12 @@ if TYPE_CHECKING:
 _REFINEMENTS, _BETWEEN, _CLOSE = 3, 6, 1e-5
 """Times that speeds are added about peaks, how many between two, and how near is near enough."""
 _MILLI = 1e3
+_USUAL = (0.161, 1.933)
+"""Turns in a period of the most flexible mode, where nothing is said of the spindle: of the
+paper's machine 1000 to 12,000 rev/min."""
+_ABOUT_THE_CUT = 1.25
+"""Ratio of a usual range's ends to the speed of the cut, at least; of its top to the depth."""
+_HEADROOM = 2.6
 
 
 def chart_speeds(low_rpm: float, high_rpm: float, count: int = 800) -> Array:
@@ -66,6 +74,28 @@ def chart_limits(
         order = np.argsort(every['spindle_speed_rpm'], kind='stable')
         found = SafeLimit(**{name: values[order] for name, values in every.items()})
     return found
+
+
+def usual_speeds(machine: Machine, cut: Cut) -> tuple[float, float]:
+    """Some lobes of the most flexible mode, and the cut, rev/min."""
+    modes = (*machine.tool.modes, *machine.workpiece.modes)
+    flexible = min(modes, key=lambda mode: mode.stiffness)
+    low, high = (
+        float(f'{turns * 60.0 * flexible.natural_frequency / (2.0 * math.pi):.2g}')
+        for turns in _USUAL
+    )
+    speed = cut.spindle_speed_rpm
+    low, high = min(low, speed / _ABOUT_THE_CUT), max(high, speed * _ABOUT_THE_CUT)
+    allowed = limits_of(Cut, 'spindle_speed_rpm')
+    return max(low, allowed.low), min(high, allowed.high)
+
+
+def top_of_chart(cut: Cut, limits: SafeLimit) -> float:
+    """Where a chart may end, m: some lowest limits up, and above the cut."""
+    lowest = float(np.min(limits.open_limit))
+    deep = _ABOUT_THE_CUT * cut.depth_of_cut
+    highest = limits_of(Cut, 'depth_of_cut').high
+    return min(max(_HEADROOM * lowest, deep), highest) if math.isfinite(lowest) else 2.0 * deep
 
 
 def _about_peaks(limits: SafeLimit) -> Array:

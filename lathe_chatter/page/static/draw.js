@@ -1,0 +1,243 @@
+// How signals, portraits, spectra and the chart are drawn; nothing here knows where they come from.
+'use strict';
+
+const SIGNALS = ['tool_displacement', 'tool_velocity', 'workpiece_displacement', 'workpiece_velocity'];
+const MILLI = 1e3, MICRO = 1e6;
+
+function css(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+}
+
+function axis(label, more) {
+  return {
+    label, stroke: () => css('ink'), grid: {stroke: () => css('grid'), width: 1},
+    ticks: {stroke: () => css('grid'), width: 1}, labelSize: 22, size: more?.side ? 62 : 34,
+    font: '12px system-ui', labelFont: '12px system-ui', ...more,
+  };
+}
+
+// At least so much of both sides of the middle: what is at rest else fills a plot with its rounding.
+function room(least) {
+  return (u, low, high) => {
+    if (low == null || !isFinite(low)) return [-least, least];
+    const middle = (low + high) / 2, half = Math.max((high - low) * 0.55, least);
+    return [middle - half, middle + half];
+  };
+}
+
+const plots = new Map();
+
+// A plot in a place, with options as `make` has them, made anew where `made` is another than before;
+// `more` is kept at the plot, for what is drawn by hand.
+function plot(id, made, make, data, more = {}) {
+  const place = document.getElementById(id);
+  if (!place.clientWidth) return null;
+  let u = plots.get(id);
+  if (u?.made === made) {
+    Object.assign(u, more);
+    if (data) u.setData(data); else u.redraw(false);
+    return u;
+  }
+  u?.destroy();
+  const keep = {hooks: {init: [u => Object.assign(u, more, {made})]}};
+  const options = make();
+  keep.hooks = {...options.hooks, ...keep.hooks};
+  u = new uPlot({width: place.clientWidth, cursor: {show: false}, ...options, ...keep}, data, place);
+  u.root.setAttribute('role', 'img');
+  plots.set(id, u);
+  return u;
+}
+
+function describe(id, text) {
+  plots.get(id)?.root.setAttribute('aria-label', text);
+}
+
+const resizing = new ResizeObserver(entries => {
+  for (const {target} of entries) {
+    const u = plots.get(target.id);
+    if (u && target.clientWidth && u.width !== target.clientWidth) {
+      u.setSize({width: target.clientWidth, height: u.height});
+    }
+  }
+});
+document.querySelectorAll('.plot').forEach(place => resizing.observe(place));
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  for (const u of plots.values()) u.redraw();
+});
+
+// Envelopes over time of tool and workpiece: smallest and largest value of each stretch in turn.
+function drawSignals(id, what, times, values, height, onSelect) {
+  const factor = what === 'displacement' ? MICRO : MILLI;
+  const unit = what === 'displacement' ? 'µm' : 'mm/s';
+  const line = (label, colour) => ({label, stroke: () => css(colour), width: 1, points: {show: false}});
+  const u = plot(id, height, () => ({
+    height, legend: {show: true, live: false},
+    series: [{}, line('tool', 'tool'), line('workpiece', 'workpiece')],
+    scales: {x: {time: false}, y: {range: room(factor * (what === 'displacement' ? 1e-8 : 1e-5))}},
+    axes: [axis('simulated time / s'), axis(`${what} / ${unit.includes('/') ? `(${unit})` : unit}`, {side: 3})],
+    cursor: {show: !!onSelect, drag: {x: true, y: false, setScale: false}},
+    hooks: onSelect ? {setSelect: [u => {
+      if (u.select.width > 4) {
+        onSelect(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'));
+        u.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
+      }
+    }]} : {},
+  }), [times, values[0], values[1]]);
+  if (!u) return;
+  const range = column => {
+    const known = column.filter(v => v != null);
+    return known.length ? `${number(Math.min(...known))} to ${number(Math.max(...known))}` : 'unknown';
+  };
+  const now = performance.now();
+  if (!(now - u.described < 2000)) {
+    u.described = now;
+    const span = times.length ? `from ${number(times[0])} to ${number(times[times.length - 1])} s` : '';
+    describe(id, `${what} ${span}: tool ${range(values[0])}, workpiece ${range(values[1])} ${unit}`);
+  }
+}
+
+function number(value, digits = 3) {
+  return value == null || !isFinite(value) ? '–' : Number(value.toPrecision(digits)).toLocaleString('en', {maximumFractionDigits: 9, useGrouping: false});
+}
+
+// Axes for what is drawn by hand over them.
+function canvas(id, axes, ranges, hand) {
+  plot(id, id, () => ({
+    height: 210, axes, legend: {show: false},
+    scales: {x: {time: false, range: u => u.ranges[0]}, y: {range: u => u.ranges[1]}},
+    series: [{}, {points: {show: false}}],
+    hooks: {draw: [u => u.hand(u)]},
+  }), [ranges[0], [null, null]], {ranges, hand});
+}
+
+function extent(values, least) {
+  let low = Infinity, high = -Infinity;
+  for (const v of values) {
+    if (v < low) low = v;
+    if (v > high) high = v;
+  }
+  return room(least)(null, low, high);
+}
+
+function drawPortrait(id, body, line, points) {
+  const n = line.length / 2;
+  if (!n) return;
+  const x = line.subarray(0, n).map(v => v * MICRO), y = line.subarray(n).map(v => v * MILLI);
+  const axes = [axis(`${body} / µm`), axis('velocity / (mm/s)', {side: 3, size: 54})];
+  canvas(id, axes, [extent(x, 0.01), extent(y, 0.01)], u => {
+    const {ctx} = u, to = (v, scale) => u.valToPos(v, scale, true);
+    clip(u);
+    ctx.strokeStyle = css(body);
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    for (let k = 0; k < n; k++) ctx.lineTo(to(x[k], 'x'), to(y[k], 'y'));
+    ctx.stroke();
+    ctx.fillStyle = css('ink');
+    for (let k = 0; k < points.length / 2; k++) {
+      dot(ctx, to(points[k] * MICRO, 'x'), to(points[k + points.length / 2] * MILLI, 'y'), 2);
+    }
+    ctx.restore();
+  });
+  describe(id, `Phase portrait of the ${body}: ${number(Math.min(...x))} to ${number(Math.max(...x))} µm, ${points.length / 2} turns`);
+}
+
+function clip(u) {
+  u.ctx.save();
+  u.ctx.beginPath();
+  u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+  u.ctx.clip();
+}
+
+function dot(ctx, x, y, radius) {
+  ctx.beginPath();
+  ctx.arc(x, y, radius * devicePixelRatio, 0, 2 * Math.PI);
+  ctx.fill();
+}
+
+function upright(u, x, colour, label, dash = []) {
+  const at = u.valToPos(x, 'x', true), {ctx, bbox} = u;
+  ctx.strokeStyle = ctx.fillStyle = css(colour);
+  ctx.setLineDash(dash.map(v => v * devicePixelRatio));
+  ctx.beginPath();
+  ctx.moveTo(at, bbox.top);
+  ctx.lineTo(at, bbox.top + bbox.height);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  if (!label) return;
+  ctx.font = `${12 * devicePixelRatio}px system-ui`;
+  const left = at + 4 * devicePixelRatio, width = ctx.measureText(label).width;
+  ctx.fillText(label, Math.min(left, bbox.left + bbox.width - width), bbox.top + 12 * devicePixelRatio);
+}
+
+// Amplitudes on a logarithmic scale, the harmonics of the spindle dotted, chatter by a line.
+function drawSpectrum(amplitudes, step, speed, chatter) {
+  const x = Float64Array.from(amplitudes, (_, k) => k * step);
+  const y = Array.from(amplitudes, v => Math.max(v * MICRO, 1e-7));
+  plot('spectrum', 'spectrum', () => ({
+    height: 220, legend: {show: false},
+    scales: {x: {time: false}, y: {distr: 3, range: (u, low, high) => [Math.max(high / 1e5, 1e-7), high * 2]}},
+    axes: [axis('frequency / Hz'), axis('amplitude / µm', {side: 3})],
+    series: [{}, {stroke: () => css('tool'), width: 1, points: {show: false}}],
+    hooks: {draw: [u => {
+      clip(u);
+      u.ctx.lineWidth = devicePixelRatio;
+      for (let k = 1; u.turn && k <= 20; k++) upright(u, k * u.turn, 'line', '', [1, 4]);
+      if (u.chatter) upright(u, u.chatter, 'alarm', `${u.chatter.toFixed(1)} Hz`);
+      u.ctx.restore();
+    }]},
+  }), [x, y], {turn: speed / 60, chatter});
+  let peak = 1;
+  amplitudes.forEach((v, k) => { if (k && v > amplitudes[peak]) peak = k; });
+  describe('spectrum', `Spectrum of the tool: largest ${number(amplitudes[peak] * MICRO)} µm at ${number(peak * step)} Hz${chatter ? `, chatter at ${number(chatter)} Hz` : ''}`);
+}
+
+const LIMITS = [
+  ['depth_of_cut', 'small disturbances die out', 'safe', [], 'none seated gap both_sides'],
+  ['open_limit', 'limit, open', 'tool', [], 'none gap both_sides'],
+  ['seated_limit', 'limit, on its bearing', 'workpiece', [8, 4], 'seated gap both_sides'],
+  ['seating_line', 'seating line', 'ink', [2, 3], 'gap both_sides'],
+  ['stable_95%', 'stable with 95 %', 'safe', [6, 2], ''],
+  ['stable_50%', '50 %', 'safe', [4, 4], ''],
+  ['stable_5%', '5 %', 'safe', [2, 6], ''],
+];
+
+// The chart with the operating point {speed, depth}, its trail, and the recommended speed.
+function drawChart(chart, point, trail, recommended, alarmed) {
+  const shown = LIMITS.filter(([name, , , , contacts]) =>
+    chart[name]?.some(v => v != null) && (!contacts || contacts.split(' ').includes(chart.contact)));
+  const top = Math.max(chart.top, (point?.depth ?? 0) * 1.25) * MILLI;
+  const same = plots.get('chart')?.made === chart && plots.get('chart').top === top;
+  const data = same ? null : [chart.speed, ...shown.map(([name]) =>
+    chart[name].map(v => (v == null ? 10 * top : Math.min(v * MILLI, 10 * top))))];
+  plot('chart', chart, () => ({
+    height: 320, legend: {show: true, live: false},
+    scales: {x: {time: false, range: () => [chart.speed[0], chart.speed[chart.speed.length - 1]]},
+      y: {range: u => [0, u.top]}},
+    axes: [axis('spindle speed / (rev/min)'), axis('depth of cut / mm', {side: 3})],
+    series: [{}, ...shown.map(([name, label, colour, dash]) => ({
+      label, dash, stroke: () => css(colour), width: name === 'depth_of_cut' ? 0 : 1.5, points: {show: false},
+      fill: name === 'depth_of_cut' ? () => `${css(colour)}30` : undefined,
+    }))],
+    hooks: {draw: [u => u.hand(u)]},
+  }), data, {top, hand: u => {
+    const {ctx} = u, to = p => [u.valToPos(p.speed, 'x', true), u.valToPos(p.depth * MILLI, 'y', true)];
+    clip(u);
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    if (recommended) upright(u, recommended, 'safe', `${Math.round(recommended)}`, [6, 3]);
+    ctx.strokeStyle = css('soft');
+    ctx.beginPath();
+    for (const p of trail) ctx.lineTo(...to(p));
+    if (point) ctx.lineTo(...to(point));
+    ctx.stroke();
+    ctx.fillStyle = css('soft');
+    for (const p of trail) dot(ctx, ...to(p), 2);
+    if (point) {
+      ctx.fillStyle = css(alarmed ? 'alarm' : 'paper');
+      ctx.strokeStyle = css('ink');
+      ctx.lineWidth = 2.5 * devicePixelRatio;
+      dot(ctx, ...to(point), 7);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }});
+}

@@ -1,0 +1,437 @@
+// The operator's page: what comes from the server is shown, what the operator wishes is sent to it.
+'use strict';
+
+const $ = id => document.getElementById(id);
+const COUNT = 1000, WINDOWS = [2, 60];
+// Units of the shop floor: of a parameter by name, else by its SI unit; and where a slider ends.
+const SHOP = {
+  spindle_speed_rpm: ['rev/min', 1, 12000], depth_of_cut: ['mm', 1e3, 2], bearing_clearance: ['µm', 1e6, 20],
+  feed_speed: ['mm/s', 1e3, 10], feed_per_revolution: ['mm/rev', 1e3, 0.5], workpiece_diameter: ['mm', 1e3, 200],
+  runout: ['µm', 1e6, 20], tool_runout: ['µm', 1e6, 20], sensor_noise: ['µm', 1e6, 1], real_time_factor: ['', 1, 5],
+  force_noise: ['N/√Hz', 1, 1], cutting_force_noise: ['N/√Hz', 1, 1], acceleration_noise: ['m/s²', 1, 10],
+  speed_variation_amplitude: ['%', 100, 50], speed_variation_frequency: ['Hz', 1, 10], unbalance: ['g mm', 1e6, 5000],
+};
+const PRIMARY = ['spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'bearing_contact', 'feed_speed', 'feed_per_revolution'];
+
+let socket = null, retries = 0, asked = 0, frames = 0;
+const waiting = new Map();
+let cell, page, server, trail, signals, envelopes, recommended, recorded = false;
+
+function forget() {
+  cell = {};
+  trail = [];
+  signals = null;
+  envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
+}
+
+// ---- connection ------------------------------------------------------------------------------
+
+function connect() {
+  forget();
+  page = {};
+  server = {};
+  waiting.forEach(done => done({ok: false, text: 'The connection was lost before an answer came.'}));
+  waiting.clear();
+  socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/feed`);
+  socket.binaryType = 'arraybuffer';
+  socket.onopen = () => {
+    retries = 0;
+    const token = sessionStorage.getItem('token');
+    if (token) ask({do: 'token', token}).then(answer => { if (!answer.ok) notify(answer); });
+    wish({do: 'next'});
+  };
+  socket.onmessage = message => {
+    const length = new DataView(message.data).getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message.data, 4, length)));
+    const arrays = {};
+    let start = 4 + length;
+    for (const [name, size] of header.arrays) {
+      arrays[name] = new Float32Array(message.data, start, size);
+      start += 4 * size;
+    }
+    // Not before this one is drawn: a page that nobody sees asks for nothing.
+    requestAnimationFrame(() => wish({do: 'next'}));
+    take(header, arrays);
+  };
+  socket.onclose = event => {
+    const wait = Math.min(5, 0.5 * 2 ** retries++);
+    $('gone').textContent = `${event.reason || 'The server of this page does not answer.'} What you see is old. Trying again (${retries}) ...`;
+    $('gone').hidden = false;
+    lock();
+    setTimeout(connect, wait * 1000);
+  };
+}
+
+function wish(message) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+function ask(message) {
+  return new Promise(done => {
+    if (socket.readyState !== WebSocket.OPEN) return done({ok: false, text: 'The server of this page is gone.'});
+    waiting.set(++asked, done);
+    wish({...message, id: asked});
+  });
+}
+
+function notify({ok, text}) {
+  if (!text) return;
+  $('notice').textContent = text;
+  $('notice').hidden = false;
+  $('notice').classList.toggle('bad', !ok);
+  clearTimeout(notify.timer);
+  notify.timer = setTimeout(() => { $('notice').hidden = true; }, ok ? 4000 : 12000);
+}
+
+const act = message => ask(message).then(answer => (notify(answer), answer));
+
+// ---- what comes ------------------------------------------------------------------------------
+
+function take(header, arrays) {
+  frames += 1;
+  for (const answer of header.answers ?? []) {
+    const done = waiting.get(answer.id);
+    waiting.delete(answer.id);
+    if (done) done(answer); else notify(answer);
+  }
+  if (header.page) takePage(header.page);
+  if (header.server) takeServer(header.server);
+  if (header.run) takeRun(header, arrays);
+  if (header.cell) takeCell(header.cell);
+  if (header.signals) takeSignals(header.signals, arrays);
+  if (header.closeup) takeCloseup(header.closeup, arrays);
+}
+
+function takePage(news) {
+  Object.assign(page, news);
+  recorded = !!page.recorded;
+  document.body.classList.toggle('is-recorded', recorded);
+  if (news.lathes) {
+    const before = $('lathes').value || sessionStorage.getItem('lathe');
+    $('lathes').replaceChildren(...news.lathes.map(name => new Option(name)));
+    if (news.lathes.includes(before)) $('lathes').value = before;
+    if (news.lathes.length && (!cell.name || cell.name !== $('lathes').value)) choose();
+    else if (!news.lathes.length) showGone('No lathe is there yet. The page waits for one.');
+  }
+  if (news.scenarios) $('scenario').replaceChildren(...news.scenarios.map(name => new Option(name)));
+}
+
+function choose() {
+  forget();
+  sessionStorage.setItem('lathe', $('lathes').value);
+  act({do: 'choose', lathe: $('lathes').value});
+}
+
+function takeServer(news) {
+  Object.assign(server, news);
+  const free = !server.operator;
+  $('operate').textContent = server.operating ? 'Look on' : free ? 'Operate' : 'Take over';
+  $('operate').setAttribute('aria-pressed', String(server.operating));
+  $('operate').disabled = !server.trusted;
+  const who = server.operating ? 'you operate' : free ? 'nobody operates' : `${server.operator} operates`;
+  $('viewers').textContent = `${server.viewers} ${server.viewers === 1 ? 'viewer' : 'viewers'}, ${who}. You are ${server.you}${server.trusted ? '' : ', without the token: you may look, and not act'}.`;
+  lock();
+}
+
+// What may be pressed now, and what not.
+function lock() {
+  const mine = server.operating && socket.readyState === WebSocket.OPEN;
+  document.querySelectorAll('.act').forEach(each => { each.disabled = !mine; });
+  recommended = cell.figures?.recommended_speed_rpm;
+  $('take-recommended').disabled = !mine || !recommended;
+  $('take-recommended').textContent = recommended ? `Set ${Math.round(recommended)} rev/min` : 'No speed is recommended';
+}
+
+function takeCell(news) {
+  Object.assign(cell, news);
+  const shown = {
+    lathe_rows: makeControls, lathe_values: showValues, supervisor_rows: makeSupervisor,
+    supervisor_values: values => { if (document.activeElement !== $('mode')) $('mode').value = values.mode; },
+    action: text => { $('action').textContent = text; }, figures: showFigures, flag: showLamp, state: showLamp,
+    alive: showAlive, statuses: showStatuses, log: showLog, chart: showChart, charting: showChart,
+    scenario: showScenario,
+  };
+  for (const name of Object.keys(news)) shown[name]?.(news[name]);
+}
+
+function showGone(text) {
+  $('gone').textContent = text;
+  $('gone').hidden = !text;
+}
+
+function showAlive() {
+  const {lathe, monitor, recorder, samples} = cell.alive;
+  const run = cell.statuses?.lathe?.pace?.message;
+  const words = [];
+  if (!lathe && !samples) words.push(`${cell.name} is silent: ended, killed or out of reach. What you see is old; the page goes on when it is back.`);
+  else if (!samples && !['paused', 'ended'].includes(run)) words.push(`No samples come from ${cell.name}.`);
+  if (!monitor) words.push('The monitor is silent: nothing is known of chatter.');
+  if (!recorder) words.push('No recorder is there.');
+  const heard = cell.statuses?.monitor?.samples;
+  for (const text of [cell.complaint, heard?.level > 1 ? heard.message : '']) if (text) words.push(text);
+  showGone(words.join(' '));
+  if (!monitor) $('lamp').className = 'lamp';
+  showLamp();
+}
+
+function showLamp() {
+  const {flag, state, alive} = cell, known = flag && alive?.monitor;
+  $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
+  const word = !known ? 'unknown' : flag.up ? 'CHATTER' : state ?? 'no chatter';
+  if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
+  const since = !known ? '' : flag.since != null ? `since ${flag.since.toFixed(2)} s` : flag.up ? 'since before this page looked' : '';
+  if ($('lamp-since').textContent !== since) $('lamp-since').textContent = since;
+}
+
+function showFigures() {
+  const f = cell.figures ?? {}, cut = cell.statuses?.monitor?.cut?.values ?? {};
+  const error = key => (cut[key] == null || isNaN(cut[key]) ? '' : ` ± ${number(Number(cut[key]), 2)}`);
+  const margin = cut['standard error of the margin'];
+  const texts = {
+    growth_rate: f.growth_rate == null ? '–' : `${number(f.growth_rate)}${error('standard error of the growth rate, 1/s')} /s`,
+    frequency: f.frequency == null ? '–' : `${f.frequency.toFixed(1)} Hz`,
+    amplitude: f.amplitude == null ? '–' : `${number(f.amplitude * MICRO)} µm`,
+    margin: f.margin == null ? '–' : `${(f.margin * 100).toFixed(0)}${margin == null || isNaN(margin) ? '' : ` ± ${(margin * 100).toFixed(0)}`} %`,
+    recommended: f.recommended_speed_rpm == null ? '–' : `${Math.round(f.recommended_speed_rpm)} rev/min`,
+  };
+  for (const [id, text] of Object.entries(texts)) if ($(id).textContent !== text) $(id).textContent = text;
+  lock();
+}
+
+function showStatuses() {
+  const {lathe, monitor, recorder} = cell.statuses, pace = lathe?.pace, v = pace?.values ?? {};
+  const paused = pace?.message === 'paused';
+  const button = document.querySelector('[data-call=pause], [data-call=resume]');
+  button.dataset.call = paused ? 'resume' : 'pause';
+  button.textContent = paused ? 'Go on' : 'Pause';
+  const lost = [
+    [Number(monitor?.samples?.values?.['samples lost'] ?? 0), 'the monitor'],
+    [Number(recorder?.recording?.values?.lost ?? 0), 'the recorder'], [signals?.lost ?? 0, 'this page'],
+  ].filter(([count]) => count).map(([count, who]) => `${count} by ${who}`);
+  $('health').className = (pace?.level ?? 0) || lost.length ? 'bad' : '';
+  $('health').textContent = pace ? `${pace.message}: ${number(Number(v['real-time factor']))} × real time, late by ${number(Number(v['lateness p99, us']) / 1e3)} ms (p99), ${number(Number(v['lag given up, s']))} s given up. Lost: ${lost.join(', ') || 'nothing'}.` : '';
+  const recording = recorder?.recording;
+  $('recording').textContent = recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
+  showFigures();
+}
+
+function showLog() {
+  const items = [...cell.log].reverse().map(entry => {
+    const item = document.createElement('li'), who = document.createElement('span');
+    who.className = 'who';
+    who.textContent = `${entry.node.split('/').pop()}: `;
+    item.className = entry.level >= 40 ? 'error' : entry.level >= 30 ? 'warn' : '';
+    item.append(who, entry.text);
+    return item;
+  });
+  $('log').replaceChildren(...items);
+}
+
+function showScenario({playing, text}) {
+  $('scenario-text').textContent = text;
+  $('play').textContent = playing ? 'Stop' : 'Play';
+}
+
+function takeSignals(news, arrays) {
+  if (signals && signals.epoch !== news.epoch) {
+    envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
+    trail = [];
+  }
+  signals = news;
+  news.spans.forEach(([first, count, step], k) => {
+    const e = envelopes[k], values = arrays[`envelope_${k}`], width = SIGNALS.length;
+    const missed = e.times.length ? Math.min(first - e.next, COUNT) : 0;
+    const add = (at, low, high) => {
+      e.times.push(at * step, (at + 0.5) * step);
+      for (let s = 0; s < width; s++) e.values[s].push(low(s), high(s));
+    };
+    for (let m = missed; m > 0; m--) add(first - m, () => null, () => null);
+    for (let m = 0; m < count; m++) {
+      const of = offset => s => {
+        const v = values[(offset + m) * width + s];
+        return Number.isNaN(v) ? null : v * (s % 2 ? MILLI : MICRO);
+      };
+      add(first + m, of(0), of(count));
+    }
+    e.next = first + count;
+    const old = e.times.length - 2 * COUNT;
+    if (old > 0) for (const list of [e.times, ...e.values]) list.splice(0, old);
+    if (count && (k === 0 || frames % 10 === 0)) drawEnvelope(k);
+  });
+  if (frames % 4 === 0) $('clock').textContent = `${news.time.toFixed(1)} s`;
+}
+
+function drawEnvelope(k, height = k ? 110 : 170, onSelect = null) {
+  const {times, values} = envelopes[k];
+  drawSignals(`displacement-${k}`, 'displacement', times, [values[0], values[2]], height, onSelect);
+  drawSignals(`velocity-${k}`, 'velocity', times, [values[1], values[3]], height, onSelect);
+}
+
+function takeCloseup(figures, arrays) {
+  const chatter = cell.flag?.up ? cell.figures?.frequency ?? figures.chatter : null;
+  for (const body of ['tool', 'workpiece']) {
+    if (arrays[`${body}_portrait`]) drawPortrait(`${body}-portrait`, body, arrays[`${body}_portrait`], arrays[`${body}_turns`] ?? []);
+  }
+  if (arrays.spectrum) drawSpectrum(arrays.spectrum, figures.hertz, figures.speed, chatter);
+  const depth = figures.depth ?? cell.lathe_values?.depth_of_cut;
+  const speed = figures.speed ?? cell.lathe_values?.spindle_speed_rpm;
+  if (depth == null) return;
+  const last = trail[trail.length - 1];
+  if (!recorded && (!last || Math.abs(last.speed - speed) > 5 || Math.abs(last.depth - depth) > 1e-6)) {
+    trail.push({speed, depth});
+    if (trail.length > 60) trail.shift();
+  }
+  cell.point = {speed, depth};
+  showChart();
+}
+
+function showChart() {
+  const {chart, point} = cell;
+  if (!chart || chart.error) {
+    $('chart-text').textContent = chart?.error ?? (cell.charting ? 'The chart is being computed ...' : '');
+    return;
+  }
+  drawChart(chart, point, trail, recommended, cell.flag?.up);
+  const k = point ? chart.speed.findIndex(speed => speed >= point.speed) : -1;
+  const limit = name => (chart[name][k] == null ? 'none' : `${(chart[name][k] * MILLI).toFixed(3)} mm`);
+  const text = k < 0 ? '' : `The cut: ${point.speed.toFixed(0)} rev/min, ${(point.depth * MILLI).toFixed(3)} mm. Small disturbances die out there up to ${limit('depth_of_cut')}; limit open ${limit('open_limit')}${chart.contact === 'none' ? '' : `, on its bearing ${limit('seated_limit')}`}.${cell.charting ? ' The chart is being computed anew ...' : ''}`;
+  if ($('chart-text').textContent !== text) {
+    $('chart-text').textContent = text;
+    describe('chart', `Stability chart. ${text}`);
+  }
+}
+
+// ---- what is done ----------------------------------------------------------------------------
+
+function shop(row) {
+  const {name, unit, high} = row;
+  if (SHOP[name]) return SHOP[name];
+  if (unit === 'm') return high <= 1e-3 ? ['µm', 1e6, high * 1e6] : ['mm', 1e3, high * 1e3];
+  if (unit === 'm/s') return ['mm/s', 1e3, high * 1e3];
+  return [unit, 1, high];
+}
+
+function makeControls(rows) {
+  const run = rows.filter(row => !row.fixed && (row.choices.length || row.type === 1 || row.low != null));
+  const order = row => (PRIMARY.indexOf(row.name) + 1 || 99);
+  for (const [id, wanted] of [['primary', true], ['secondary', false]]) {
+    const mine = run.filter(row => PRIMARY.includes(row.name) === wanted).sort((a, b) => order(a) - order(b));
+    $(id).replaceChildren(...mine.map(row => makeControl(row)));
+  }
+  $('fixed').replaceChildren(...rows.filter(row => row.fixed).flatMap(row => {
+    const name = document.createElement('dt'), value = document.createElement('dd');
+    name.textContent = row.name;
+    value.dataset.fixed = row.name;
+    value.dataset.unit = row.unit;
+    return [name, value];
+  }));
+  if (cell.lathe_values) showValues();
+  lock();
+}
+
+const controls = new Map();
+
+function makeControl(row) {
+  const [unit, factor, end] = shop(row), place = document.createElement('div'), id = `p-${row.name}`;
+  place.className = 'control';
+  const label = document.createElement('label'), line = document.createElement('div');
+  label.htmlFor = id;
+  label.textContent = row.name.replace(/_rpm$/, '').replaceAll('_', ' ') + (unit ? ` / ${/[/ ]/.test(unit) ? `(${unit})` : unit}` : '');
+  line.className = 'row';
+  const help = document.createElement('small'), refusal = document.createElement('span');
+  help.id = `${id}-help`;
+  help.textContent = row.meaning;
+  refusal.className = 'refusal';
+  refusal.setAttribute('role', 'alert');
+  const listed = row.choices.length || row.type === 1;
+  const field = document.createElement(listed ? 'select' : 'input');
+  if (listed) field.append(...(row.choices.length ? row.choices : ['true', 'false']).map(v => new Option(v)));
+  else Object.assign(field, {type: 'number', step: 'any', inputMode: 'decimal'});
+  field.id = id;
+  field.setAttribute('aria-describedby', help.id);
+  const parts = [field];
+  let slider = null;
+  if (!listed) {
+    slider = Object.assign(document.createElement('input'), {type: 'range', min: row.low * factor, max: end, step: end / 1000});
+    slider.setAttribute('aria-label', `${label.textContent}, slider`);
+    parts.unshift(slider);
+  }
+  parts.forEach(each => each.classList.add('act'));
+  line.append(...parts);
+  place.append(label, line, help, refusal);
+  const control = {show, busy: false, next: null};
+  controls.set(row.name, control);
+
+  function show(value, force) {
+    const shown = typeof value === 'number' ? Number((value * factor).toPrecision(9)) : String(value);
+    if (!force && (control.busy || control.next != null)) return;
+    if (force || document.activeElement !== field || listed) field.value = shown;
+    if (slider) {
+      if (shown > slider.max) slider.max = shown * 1.5;
+      slider.value = shown;
+    }
+  }
+  // One request at a time, and then the newest: a slider that is drawn floods nobody.
+  async function send(value) {
+    control.next = value;
+    if (control.busy) return;
+    control.busy = true;
+    let answer = {ok: true, text: ''};
+    while (control.next != null) {
+      const wanted = control.next;
+      control.next = null;
+      answer = await ask({do: 'set', node: 'lathe', values: {[row.name]: wanted}});
+    }
+    control.busy = false;
+    refusal.textContent = answer.ok ? '' : answer.text;
+    if (!answer.ok && cell.lathe_values) show(cell.lathe_values[row.name], true);
+  }
+  const wanted = text => (row.type === 1 ? text === 'true' : listed ? text : Number(text) / factor);
+  field.addEventListener('change', () => {
+    if (!listed && field.value.trim() === '') return show(cell.lathe_values[row.name], true);
+    if (slider) slider.value = field.value;
+    send(wanted(field.value));
+  });
+  slider?.addEventListener('input', () => {
+    field.value = Number(Number(slider.value).toPrecision(6));
+    send(wanted(slider.value));
+  });
+  return place;
+}
+
+function showValues() {
+  for (const [name, control] of controls) {
+    if (cell.lathe_values[name] != null) control.show(cell.lathe_values[name]);
+  }
+  document.querySelectorAll('[data-fixed]').forEach(each => {
+    const value = cell.lathe_values[each.dataset.fixed];
+    each.textContent = value == null ? '–' : `${typeof value === 'number' ? number(value, 6) : String(value).slice(0, 200) || 'empty'} ${each.dataset.unit}`;
+  });
+}
+
+function makeSupervisor(rows) {
+  const mode = rows?.find(row => row.name === 'mode');
+  $('supervisor').hidden = !mode;
+  if (mode) $('mode').replaceChildren(...mode.choices.map(name => new Option(name)));
+  lock();
+}
+
+document.addEventListener('click', event => {
+  const {call} = event.target.dataset ?? {};
+  if (call) act({do: call});
+});
+$('operate').onclick = () => act(server.operating ? {do: 'release'} : {do: 'operate', take_over: !!server.operator});
+$('take-recommended').onclick = () => act({do: 'set', node: 'lathe', values: {spindle_speed_rpm: Math.round(recommended)}});
+$('knock').onclick = () => act({do: 'knock', impulse: Number($('impulse').value) / 1e3});
+$('play').onclick = () => act(cell.scenario?.playing ? {do: 'stop_playing'} : {do: 'play', scenario: $('scenario').value});
+$('lathes').onchange = choose;
+$('mode').onchange = () => act({do: 'set', node: 'supervisor', values: {mode: $('mode').value}}).then(answer => {
+  if (!answer.ok) $('mode').value = cell.supervisor_values.mode;
+});
+
+const given = new URLSearchParams(location.hash.slice(1)).get('token');
+if (given) {
+  sessionStorage.setItem('token', given);
+  history.replaceState(null, '', location.pathname);
+}
+connect();
