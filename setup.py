@@ -17,6 +17,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed'],
+        f'{NAME}.dataset': ['*.j2'],
         f'{NAME}.paper': ['*.j2'],
         f'{NAME}.page': ['static/*'],
     },

@@ -63,6 +63,14 @@ class MachineFileError(LatheChatterError, ValueError):
     """A machine file that cannot be used: with its line, and what is allowed there."""
 
 
+class PlanError(LatheChatterError, ValueError):
+    """A plan of a data set that cannot be carried out, and why."""
+
+
+class DatasetError(LatheChatterError):
+    """A folder that is no data set, or not the one wanted."""
+
+
 class ResultFileError(LatheChatterError):
     """A file of results, as of a map of knocks, that is none, or not the one wanted."""
 

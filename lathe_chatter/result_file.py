@@ -47,6 +47,7 @@ class ResultFile:
             self._file.seek(len(whole))
             if not whole:
                 self._file.write(_line(header))
+                self._file.flush()
         except OSError as error:
             raise self._not_written(error) from None
 

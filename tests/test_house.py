@@ -39,6 +39,7 @@ ARROWS = {
     'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'lathe', 'detection', 'recording'},
+    'dataset': {'model', 'samples', 'lathe', 'stability', 'scenario'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'page': {'model', 'samples', 'stability', 'report'},
@@ -49,7 +50,7 @@ ARROWS = {
     },
     'cli': {
         *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'precompile'),
-        *('recording', 'scenario', 'report', 'paper', 'nodes', 'tap_test'),
+        *('recording', 'scenario', 'dataset', 'report', 'paper', 'nodes', 'tap_test'),
     },
 }
 """The packages from the bottom to the top, each with those below that it may use."""

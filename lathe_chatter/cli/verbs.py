@@ -13,6 +13,7 @@ from typing import Any, NoReturn, Protocol
 from lathe_chatter import __version__
 from lathe_chatter.cli import (
     bench,
+    dataset,
     export,
     identify,
     knock_map,
@@ -51,6 +52,7 @@ VERBS: tuple[Verb, ...] = (
     lobes,
     knock_map,
     identify,
+    dataset,
     verify,
     recover,
     export,

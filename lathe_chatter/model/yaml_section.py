@@ -11,6 +11,8 @@ from lathe_chatter.errors import MachineFileError, ParameterError, nearest_name
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.model.units import number_in, units_of
 
+_START = yaml.Mark('', 0, 0, 0, None, None)
+
 
 class Section:
     """A mapping of a YAML file whose entries know their lines."""
@@ -46,6 +48,12 @@ class Section:
         node = self.nodes.get(name)
         path = f'{self.path}.{name}' if self.path else name
         return None if node is None else Section(node, self.file, path)
+
+    def inner(self, name: str) -> Section:
+        """The mapping under a name, an empty one where there is none."""
+        return self.section(name) or Section(
+            yaml.MappingNode('', [], _START, _START), self.file, name
+        )
 
     def number(self, name: str, limits: Quantity) -> float | None:
         """The value under a name, in the unit of its limits."""

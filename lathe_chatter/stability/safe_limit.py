@@ -118,7 +118,7 @@ def seating_depth(machine: Machine, bearing_clearance: float, feed: float) -> fl
     return clearance / (force_per_depth * compliance) if compliance > 0.0 else math.inf
 
 
-def _on_the_edge(cut: Cut, *, tool_leaves_cut: bool) -> bool:
+def on_the_edge(cut: Cut, *, tool_leaves_cut: bool) -> bool:
     """Whether the workpiece stands exactly where its bearing begins, on one side."""
     without_mean = not tool_leaves_cut or cut.feed == 0.0
     gap = cut.bearing_contact is BearingContact.GAP
@@ -177,9 +177,16 @@ def safe_limit(
         at_one = [seating_depth(one, cut.bearing_clearance, feed) for one in each.ravel()]
         line = np.broadcast_to(np.reshape(at_one, each.shape) * per_feed, floating.shape)
     depth = np.where(floating <= line, floating, np.maximum(line, seated))
-    if _on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
+    if on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
         depth = np.zeros(floating.shape)
     return SafeLimit(np.broadcast_to(speeds, floating.shape), depth, floating, seated, line)
+
+
+def is_seated(machine: Machine, cut: Cut, *, tool_leaves_cut: bool = True) -> bool:
+    """Whether the mean force of a cut leaves the workpiece on its bearing."""
+    if _always_seated(cut) or not (_seats(cut) and tool_leaves_cut):
+        return _always_seated(cut)
+    return cut.depth_of_cut >= seating_depth(machine, cut.bearing_clearance, cut.feed)
 
 
 def contact_at(machine: Machine, cut: Cut, *, tool_leaves_cut: bool = True) -> ContactAt:
@@ -194,12 +201,10 @@ def contact_at(machine: Machine, cut: Cut, *, tool_leaves_cut: bool = True) -> C
         The contact at the mean force, the critical depth in that contact, and the verdict for
         small disturbances.
     """
-    seated = _always_seated(cut)
-    if not seated and _seats(cut) and tool_leaves_cut:
-        seated = cut.depth_of_cut >= seating_depth(machine, cut.bearing_clearance, cut.feed)
+    seated = is_seated(machine, cut, tool_leaves_cut=tool_leaves_cut)
     limit = critical_depth(
         machine, cut.spindle_speed_rpm, seated=seated, process=ProcessDamping.of(cut)
     )
-    if _on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
+    if on_the_edge(cut, tool_leaves_cut=tool_leaves_cut):
         limit = 0.0
     return ContactAt(seated, limit, cut.depth_of_cut < limit)
