@@ -49,8 +49,9 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         self._table = table
         self._values = table.complete(self._take_overrides())
         for row in table:
-            value = self._values[row.name]
-            self.declare_parameter(row.name, value, descriptor_of(row), ignore_override=True)
+            # A body of several modes has no one mass: what has no value is not declared.
+            if (value := self._values.get(row.name)) is not None:
+                self.declare_parameter(row.name, value, descriptor_of(row), ignore_override=True)
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._accept)
 
