@@ -75,8 +75,8 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         '--uncertain', metavar='LIST',
         help='relative standard errors of the machine, as frequency=2%%,damping=20%%,'
-        'stiffness=5%%,C=15%%: the chart shows the probability of being stable (default: '
-        'those of the machine file, if it has any)',
+        'stiffness=5%%,C=15%%, in place of those of the machine file and beside its others: the '
+        'chart shows the probability of being stable',
     )  # fmt: skip
     parser.add_argument('--map', action='store_true', help='colour the chart with the growth rate')
     parser.add_argument(
@@ -191,9 +191,10 @@ def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where
 
 def _uncertainty(options: Namespace, config: LatheConfig) -> Uncertainty | None:
     """Of the machine, None where nothing is said of any."""
+    known = config.described.uncertainty if config.described else None
     if options.uncertain is not None:
-        return uncertainty_from(options.uncertain, config.machine)
-    return config.described.uncertainty if config.described else None
+        return uncertainty_from(options.uncertain, config.machine, known)
+    return known
 
 
 def _probability(

@@ -1,8 +1,8 @@
 """How probable it is that a cut is stable, on a machine that is known with errors.
 
 Machines are drawn as the truth may be (`Uncertainty.draw`), and each has its own safe limit; the
-probability at a depth is the share of the machines whose limit lies above it. With n machines
-that share is itself known to sqrt(p (1 - p)/n): with 1000 to 0.7 % where it is 95 %.
+probability at a depth is the share of the machines whose limit lies above it. With 1000 machines
+that share is itself known to about 0.5 % where it is 95 %.
 """
 
 from __future__ import annotations
@@ -51,8 +51,9 @@ class StabilityProbability:
             ParameterError: If the probability is none.
         """
         share = _SHARE.check('probability', probability)
-        below = int(np.floor((1.0 - share) * len(self.limits)))
-        return np.asarray(self.limits[min(below, len(self.limits) - 1)])
+        # Of n limits in order the k-th is exceeded by the next with 1 - k/(n + 1).
+        below = int((1.0 - share) * (len(self.limits) + 1)) - 1
+        return np.asarray(self.limits[min(max(below, 0), len(self.limits) - 1)])
 
     def at(self, depth_of_cut: ArrayLike) -> Array:
         """The probability that a cut of some depths is stable (len(depth_of_cut), m)."""

@@ -212,6 +212,11 @@ def test_uncertainty_in_short() -> None:
     assert known.error_of('workpiece.modes[0].frequency') == pytest.approx(0.02)
     assert known.error_of('tool.modes[0].damping_ratio') == pytest.approx(0.2)
     assert known.error_of('cutting_coefficient') == pytest.approx(0.15)
+    # What a file says else stays, with its covariances.
+    told = load_machine(ERRORS)
+    both = uncertainty_from('C=3%', told.machine, told.uncertainty)
+    assert both.error_of('cutting_coefficient') == pytest.approx(0.03)
+    assert both.error_of('tool.modes[0].stiffness') == pytest.approx(math.hypot(0.05, 0.02))
     for wrong in ('speed=2%', 'frequency=two', 'frequency=-1%'):
         with pytest.raises(ParameterError, match='--uncertain'):
             uncertainty_from(wrong, Machine())
