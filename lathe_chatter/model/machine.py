@@ -20,6 +20,7 @@ where x is the displacement in the chip direction and x_B that at the bearing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -107,7 +108,8 @@ class Structure:
     @property
     def stiffness(self) -> float:
         """Static stiffness in the chip direction against the cutting force, N/m."""
-        return 1.0 / sum(mode.chip * mode.force / mode.stiffness for mode in self.modes)
+        compliance = sum(mode.chip * mode.force / mode.stiffness for mode in self.modes)
+        return 1.0 / compliance if compliance else math.inf
 
     @property
     def mass(self) -> float:

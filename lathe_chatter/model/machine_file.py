@@ -30,9 +30,9 @@ from lathe_chatter.model.cut import BearingContact, Cut
 from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.machine import Body, Machine, Mode
 from lathe_chatter.model.quantities import Quantity, limits_of
-from lathe_chatter.model.uncertainty import MODAL, Uncertainty
+from lathe_chatter.model.uncertainty import MODAL, MOST_VARIANCE, Uncertainty
 from lathe_chatter.model.units import number_in
-from lathe_chatter.model.yaml_section import Section
+from lathe_chatter.model.yaml_section import Section, text_of
 
 _TURN = 2.0 * np.pi
 _PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
@@ -195,6 +195,8 @@ def load_machine(source: Path | str) -> MachineDescription:
         raise MachineFileError(f'{name}{line}: {error.problem}.') from None
     except yaml.YAMLError as error:
         raise MachineFileError(f'{name}: {" ".join(str(error).split())}.') from None
+    except RecursionError:
+        raise MachineFileError(f'{name}: it is nested too deeply for a machine.') from None
     return _description(Section(node, name, ''), Path(name).stem)
 
 
@@ -246,7 +248,7 @@ def _bearing(section: Section | None) -> tuple[dict[str, float] | None, dict[str
         words = [choice.value for choice in BearingContact]
         if contact.value not in words:
             raise section.refused(
-                f'contact is {contact.value!r}: it must be one of {", ".join(words)}', contact
+                f'contact is {text_of(contact)!r}: it must be one of {", ".join(words)}', contact
             )
         cut['bearing_contact'] = contact.value
     return machine, cut
@@ -305,8 +307,8 @@ def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], 
         except (TypeError, ValueError):
             size = len(MODAL) * len(modes)
             raise section.refused(
-                f'covariance must be a matrix of {size} x {size} numbers, symmetric and with no '
-                'negative variance',
+                f'covariance must be a matrix of {size} x {size} numbers, symmetric and with '
+                f'variances from 0 to {MOST_VARIANCE:g}',
                 node,
             ) from None
     return modes, known

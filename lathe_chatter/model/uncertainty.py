@@ -19,7 +19,8 @@ from lathe_chatter.model.machine import Body, Machine, Structure
 
 MODAL = ('frequency', 'damping_ratio', 'stiffness')
 """The figures of a mode, in the order of a covariance."""
-OF_MACHINE = ('cutting_coefficient',)
+MOST_VARIANCE = 100.0
+"""Of a logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,8 @@ class Uncertainty:
         """
         size = len(MODAL) * modes
         if covariance.shape != (size, size) or not np.allclose(covariance, covariance.T):
+            raise ValueError
+        if not np.diag(covariance).max() <= MOST_VARIANCE:
             raise ValueError
         if np.linalg.eigvalsh(covariance).min() < -1e-9 * max(np.trace(covariance), 1e-300):
             raise ValueError

@@ -12,6 +12,13 @@ from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.model.units import number_in, units_of
 
 _START = yaml.Mark('', 0, 0, 0, None, None)
+_MOST = 10.0
+"""Relative standard error that is allowed."""
+
+
+def text_of(node: yaml.Node) -> str:
+    """What stands in the file."""
+    return str(node.value if isinstance(node, yaml.ScalarNode) else yaml.serialize(node)).strip()
 
 
 class Section:
@@ -25,6 +32,8 @@ class Section:
             raise self.refused('it must be a mapping of names to values')
         self.nodes: dict[str, yaml.Node] = {}
         for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise self.refused('a name must be a text', key)
             if key.value in self.nodes:
                 raise self.refused(f'{key.value!r} stands there twice', key)
             self.nodes[key.value] = value
@@ -60,17 +69,17 @@ class Section:
         node = self.nodes.get(name)
         if node is None:
             return None
-        full = f'{self.path}.{name}'
-        text = node.value if isinstance(node, yaml.ScalarNode) else yaml.serialize(node).strip()
+        full, text = f'{self.path}.{name}', text_of(node)
         value = number_in(text, limits.unit) if isinstance(node, yaml.ScalarNode) else None
-        try:
-            return limits.check(full, text if value is None else value)
-        except ParameterError as error:
-            units = units_of(limits.unit)
-            hint = f', in {units}' if value is None and units else ''
-            raise MachineFileError(
-                f'{self.file}, line {node.start_mark.line + 1}: {str(error).rstrip(".")}{hint}.'
-            ) from None
+        units = units_of(limits.unit)
+        allowed = limits.allowed + (f', in {units}' if units else '')
+        said = str(ParameterError(full, text, '', allowed))
+        if value is not None:
+            try:
+                return limits.check(full, value)
+            except ParameterError as error:
+                said = str(error)
+        raise MachineFileError(f'{self.file}, line {node.start_mark.line + 1}: {said}')
 
     def numbers(self, table: Mapping[str, Quantity]) -> dict[str, float]:
         """Those values of a table that are there."""
@@ -90,10 +99,11 @@ class Section:
             if name not in values:
                 raise section.refused(f'{name} has an error here and no value beside it', node)
             if isinstance(node, yaml.ScalarNode) and node.value.rstrip().endswith('%'):
-                relative = section.number(name, Quantity('standard error', high=10.0))
+                relative = section.number(name, Quantity('standard error', high=_MOST))
             else:
-                limits = replace(table[name], low=0.0, high=1e300, exclusive=False)
-                relative = (section.number(name, limits) or 0.0) / (abs(values[name]) or 1.0)
+                size = abs(values[name]) or 1.0
+                limits = replace(table[name], low=0.0, high=_MOST * size, exclusive=False)
+                relative = (section.number(name, limits) or 0.0) / size
             found[name] = relative or 0.0
         return found
 

@@ -97,11 +97,14 @@ def test_everything_that_a_file_says_comes_back(tmp_path: Path) -> None:
     assert load_machine(tmp_path / 'again.yaml') == found
 
 
+ONE_MODE = 'tool: {modes: [{frequency: 3, damping_ratio: 0.1, mass: 1%s}],\n'
+
+
 @pytest.mark.parametrize(
     ('text', 'said'),
     [
         ('tool: {modes: [{frequency: 312 kg, damping_ratio: 0.1, mass: 1}]}\n',
-         ('line 1', "tool.modes[0].frequency is '312 kg' Hz", 'rad/s')),
+         ('line 1', "tool.modes[0].frequency is '312 kg':", 'in Hz, kHz, 1/s, rad/s')),
         ('tool:\n  modes:\n    - {frequency: 3, damping_ratio: 2, mass: 1}\n',
          ('line 3', 'damping_ratio is 2', 'from 0 to 1')),
         ('tool: {modes: [{frequency: 3 Hz, damping_ratio: 0.1, mass: 1, stiffness: 3}]}\n',
@@ -117,6 +120,34 @@ def test_everything_that_a_file_says_comes_back(tmp_path: Path) -> None:
         ('- 1\n', ('mapping',)),
         ('tool: {modes: [{frequency: 3, damping_ratio: 0.1, mass: 1}], covariance: [[1]]}\n',
          ('covariance', '3 x 3')),
+        (ONE_MODE % '' + '  covariance: [[.inf, 0, 0], [0, 1, 0], [0, 0, 1]]}\n',
+         ('line 2', 'variances from 0')),
+        (ONE_MODE % ', errors: {chip: 1 %}' + '}\n',
+         ("no 'chip'", 'known are frequency')),
+        (ONE_MODE % ', errors: {stiffness: 1 %}' + '}\n',
+         ('line 1', 'stiffness has an error here and no value')),
+        (ONE_MODE % ',\n  errors: {frequency: 31 Hz}' + '}\n',
+         ('line 2', 'errors.frequency is 31', 'to 30 Hz')),
+        ('tool: {modes: [{frequency: .nan, damping_ratio: 0.1, mass: 1}]}\n', ("is '.nan'",)),
+        ('tool: {modes: [{frequency: 1e400, damping_ratio: 0.1, mass: 1}]}\n', ('is inf Hz',)),
+        ('tool: {modes: [{frequency: 3 rad/s, damping_ratio: 0.1, stiffness: 1e9}]}\n',
+         ('mass is', 'to 1e+06 kg')),
+        ('tool: {modes: [' + 17 * '{frequency: 3, damping_ratio: 0.1, mass: 1},' + ']}\n',
+         ('at most 16',)),
+        ('bearing: {contact: [gap]}\n', ("contact is '[gap]'", 'both_sides')),
+        ('bearing: {clearance: 5 mm}\n', ('bearing.clearance is 0.005 m', 'to 0.001 m')),
+        ('material: {process_damping: 3 m}\n', ("process_damping is '3 m'", 'N/m')),
+        ('material: {cutting_coefficient: 1500 Mpa}\n', ("is '1500 Mpa'", 'MPa')),
+        ('material: {errors: {cutting_coefficient: 1 %}}\n', ('no value beside it',)),
+        ('cut: {feed: 0.2 mm/s}\n', ("feed is '0.2 mm/s'", 'mm/rev')),
+        ('cut: {feed_speed: 0.2 mm/rev}\n', ("feed_speed is '0.2 mm/rev'", 'mm/min')),
+        ('cut: {workpiece_diameter: 0}\n', ('workpiece_diameter is 0.0 m',)),
+        ('cut: {}\ncut: {}\n', ('line 2', "'cut' stands there twice")),
+        ('? [1, 2]\n: 3\n', ('line 1', 'a name must be a text')),
+        ('tool: *x\n', ('undefined alias',)),
+        ('a: b\n---\nc: d\n', ('another document',)),
+        ('{"tool": ' * 2000 + '\n', ('nested too deeply',)),
+        ('tool: {modes: &a [*a]}\n', ('line 1', 'mapping')),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_sentence_with_its_line(text: str, said: tuple[str, ...]) -> None:
