@@ -106,7 +106,8 @@ def read_frequency_responses(path: Path | str) -> list[FrequencyResponse]:
     """
     path = Path(path)
     try:
-        head = path.open('rb').read(64)
+        with path.open('rb') as file:
+            head = file.read(64)
     except OSError as error:
         raise FrequencyResponseError(f'{path} cannot be read: {reason_of(error)}.') from None
     universal = path.suffix.lower() in {'.uff', '.unv', '.bunv', '.uf'} or re.match(
@@ -138,17 +139,20 @@ def _universal(path: Path) -> Iterator[FrequencyResponse]:
             continue
         order = _UFF_ORDERS.get(entry.get('ordinate_spec_data_type'))
         over = entry.get('orddenom_spec_data_type', _UFF_FORCE)
-        unit = str(entry.get('ordinate_axis_units_lab') or '').strip()
+        unit, below = (
+            text if text.upper() != 'NONE' else ''
+            for text in (
+                str(entry.get(f'{part}_axis_units_lab') or '').strip()
+                for part in ('ordinate', 'orddenom')
+            )
+        )
         if over not in {_UFF_FORCE, 0} or (order is None and not unit):
             raise FrequencyResponseError(
                 f'{path}: a function is not said to be displacement, velocity or acceleration '
                 'over force.'
             )
-        below = str(entry.get('orddenom_axis_units_lab') or '').strip()
-        if unit.upper() in {'', 'NONE'}:
-            unit = ('m', 'm/s', 'm/s2')[order or 0]
-        if below.upper() in {'', 'NONE'}:
-            below = 'N'
+        unit = unit or ('m', 'm/s', 'm/s2')[order or 0]
+        below = below or 'N'
         form, scale = _unit(unit if '/' in unit and _over_force(unit) else f'{unit}/{below}', path)
         if order is not None and ORDERS[form] != order:
             raise FrequencyResponseError(
@@ -179,8 +183,11 @@ def _over_force(unit: str) -> bool:
 
 
 def _unit(text: str, path: Path) -> tuple[str, float]:
-    """Form and factor to SI of a unit such as `um/N`, `mm/s/N`, `g/N`, `m/s^2/lbf`."""
-    motion, _, force = text.replace(' ', '').replace('^', '').replace('²', '2').rpartition('/')
+    """Form and factor to SI of a unit: `um/N`, `g/N`, `(m/s^2)/lbf`, `(1/N)*(m/s²)`."""
+    # What is no text of UTF-8 was a small two.
+    plain = re.sub(r'[()*·^\s]', '', text.replace('²', '2').replace('\ufffd', '2'))
+    before = re.match(r'1/(kN|N|lbf)(.+?)(?:/N)?$', plain)
+    motion, force = (before[2], before[1]) if before else plain.rpartition('/')[::2]
     scale = _FORCES.get(force.lower())
     if motion.lower() in {'g', 'gn'} and scale:
         return 'accelerance', _G / scale

@@ -25,6 +25,9 @@ def write_csv(path: Path, head: str, *columns: np.ndarray, separator: str = ',')
         ('mm/s/N', 'mobility', 1e3),
         ('m/s2/N', 'accelerance', 1.0),
         ('m/s²/kN', 'accelerance', 1e3),
+        ('(m/s^2)/N', 'accelerance', 1.0),
+        ('(1/N)*(m/s²)', 'accelerance', 1.0),
+        ('1/lbf*mm', 'receptance', 1e3 * 4.4482216152605),
         ('g/N', 'accelerance', 1.0 / 9.80665),
         ('g/lbf', 'accelerance', 4.4482216152605 / 9.80665),
     ],
@@ -116,6 +119,21 @@ def test_a_universal_file_in_g_over_newton(tmp_path: Path) -> None:
     )
     assert found.form == 'accelerance'
     np.testing.assert_allclose(found.response, truth.response, rtol=1e-8)
+
+
+def test_a_unit_that_is_no_utf8_and_no_unit_at_all(tmp_path: Path) -> None:
+    """As LMS and others write them: `(1/N)*(m/s²)` in Latin-1, and a general type of data."""
+    truth = tap_test(form='accelerance', coherence=False)
+    file = write_universal(
+        tmp_path / 'a.uff', truth, binary=False, ordinate_spec_data_type=1,
+        ordinate_axis_units_lab='(1/N)*(m/s2)',
+    )  # fmt: skip
+    file.write_bytes(file.read_bytes().replace(b's2)', 's²)'.encode('latin-1')))
+    (found,) = read_frequency_responses(file)
+    np.testing.assert_allclose(found.response, truth.response, rtol=1e-8)
+    unsaid = write_universal(tmp_path / 'b.uff', truth, binary=False, ordinate_spec_data_type=1)
+    with pytest.raises(FrequencyResponseError, match='not said to be displacement'):
+        read_frequency_responses(unsaid)
 
 
 def test_what_only_looks_like_a_universal_file_is_a_sentence(tmp_path: Path) -> None:
