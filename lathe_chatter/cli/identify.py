@@ -146,16 +146,17 @@ def _described(base: MachineDescription, fits: dict[str, ModalFit]) -> MachineDe
 def _show(screen: Screen, fits: dict[str, ModalFit]) -> None:
     rows: list[Sequence[str]] = []
     for body, fit in fits.items():
-        for mode in fit.modes:
+        for number, mode in enumerate(fit.modes, 1):
             f, z, k = mode.errors
             rows.append((
                 body,
+                str(number),
                 f'{mode.frequency:.4f} ± {f:.2g}',
                 f'{100.0 * mode.damping_ratio:.4f} ± {100.0 * z:.2g}',
                 f'{mode.stiffness * 1e-6:.5g} ± {k * 1e-6:.2g}',
                 f'{mode.mass:.4g}',
             ))  # fmt: skip
-    titles = ('body', 'frequency / Hz', 'damping / %', 'stiffness / (N/µm)', 'mass / kg')
+    titles = ('body', 'mode', 'frequency / Hz', 'damping / %', 'stiffness / (N/µm)', 'mass / kg')
     screen.table(
         {title: 'left' if k == 0 else 'right' for k, title in enumerate(titles)}, rows,
         'Modes, each figure ± its standard error:',

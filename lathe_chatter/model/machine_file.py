@@ -44,7 +44,6 @@ _MODE = {
     **dict.fromkeys(('chip', 'force', 'bearing'), _PARTICIPATION),
 }
 _UNCERTAIN = {k: _MODE[k] for k in ('frequency', 'damping_ratio', 'mass', 'stiffness')}
-_STIFFNESS = {'stiffness': limits_of(Machine, 'bearing_stiffness')}
 _COEFFICIENT = {'cutting_coefficient': limits_of(Machine, 'cutting_coefficient')}
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
 _SPINDLE = {
@@ -208,59 +207,48 @@ def _description(top: Section, name: str) -> MachineDescription:
         section = top.section(part)
         if section is not None:
             machine[part], known = _body(section, part, known)
-    on_bearing, cut = _bearing(top.section('bearing'))
-    if on_bearing is None and 'workpiece' in machine:
+    bearing, material = top.inner('bearing'), top.inner('material')
+    bearing.only('stiffness', *_CUT_OF_BEARING, 'contact')
+    stiffness = bearing.number('stiffness', limits_of(Machine, 'bearing_stiffness'))
+    if stiffness is not None:
+        machine['bearing_stiffness'] = stiffness
+    cut = _fields(bearing, _CUT_OF_BEARING) | _contact(bearing)
+    if 'bearing' not in top.nodes and 'workpiece' in machine:
         cut['bearing_contact'] = BearingContact.NONE
-    machine |= on_bearing or {}
-    material = top.section('material')
-    if material is not None:
-        material.only(*_COEFFICIENT, *_CUT_OF_MATERIAL, 'errors')
-        found = material.numbers(_COEFFICIENT)
-        machine |= found
-        cut |= _fields(material, _CUT_OF_MATERIAL)
-        for figure, error in material.errors(found, _COEFFICIENT).items():
-            known = known.with_error(figure, error)
-    section = top.section('cut')
-    if section is not None:
-        section.only(*_CUT)
-        cut |= _fields(section, _CUT)
-        if 'feed_per_revolution' in cut:  # the feed speed at the start; a feed of 0 is none
-            per_minute = cut['feed_per_revolution'] * cut.get('spindle_speed_rpm', _USUAL_SPEED)
-            cut.setdefault('feed_speed', per_minute / 60.0)
+    material.only(*_COEFFICIENT, *_CUT_OF_MATERIAL, 'errors')
+    found = material.numbers(_COEFFICIENT)
+    machine |= found
+    for figure, error in material.errors(found, _COEFFICIENT).items():
+        known = known.with_error(figure, error)
+    section = top.inner('cut')
+    section.only(*_CUT)
+    cut |= _fields(material, _CUT_OF_MATERIAL) | _fields(section, _CUT)
+    if 'feed_per_revolution' in cut:  # the feed speed at the start; a feed of 0 is none
+        per_minute = cut['feed_per_revolution'] * cut.get('spindle_speed_rpm', _USUAL_SPEED)
+        cut.setdefault('feed_speed', per_minute / 60.0)
     try:
         made, usual = Machine(**machine), Cut(**cut)
     except ParameterError as error:
         raise top.refused(str(error).rstrip('.')) from None
-    spindle = _spindle(top.section('spindle'))
+    spindle = _spindle(top.inner('spindle'))
     return MachineDescription(made, usual, **spindle, uncertainty=known or None, name=name)
 
 
-def _bearing(section: Section | None) -> tuple[dict[str, float] | None, dict[str, Any]]:
-    """What of the machine and what of the cut the bearing gives."""
-    if section is None:
-        return None, {}
-    section.only(*_STIFFNESS, *_CUT_OF_BEARING, 'contact')
-    found = section.numbers(_STIFFNESS)
-    machine = {'bearing_stiffness': found['stiffness']} if found else {}
-    cut: dict[str, Any] = _fields(section, _CUT_OF_BEARING)
-    contact = section.nodes.get('contact')
-    if contact is not None:
-        words = [choice.value for choice in BearingContact]
-        if contact.value not in words:
-            raise section.refused(
-                f'contact is {text_of(contact)!r}: it must be one of {", ".join(words)}', contact
-            )
-        cut['bearing_contact'] = contact.value
-    return machine, cut
-
-
-def _spindle(section: Section | None) -> dict[str, float]:
-    if section is None:
+def _contact(section: Section) -> dict[str, Any]:
+    node = section.nodes.get('contact')
+    if node is None:
         return {}
+    words = [choice.value for choice in BearingContact]
+    if text_of(node) not in words:
+        allowed = f'it must be one of {", ".join(words)}'
+        raise section.refused(f'contact is {text_of(node)!r}: {allowed}', node)
+    return {'bearing_contact': node.value}
+
+
+def _spindle(section: Section) -> dict[str, float]:
     section.only(*_SPINDLE)
     found = section.numbers(_SPINDLE)
-    ends = ('slowest', _SPEED.low), ('fastest', _SPEED.high)
-    slow, fast = (found.get(f'{which}_speed', limit) for which, limit in ends)
+    slow, fast = found.get('slowest_speed', _SPEED.low), found.get('fastest_speed', _SPEED.high)
     if not slow < fast:
         raise section.refused(
             f'fastest_speed is {fast:g} rev/min: it must be above slowest_speed, {slow:g} rev/min'

@@ -112,6 +112,10 @@ def test_a_machine_without_a_limit_has_a_chart_too(
         (['knock-map', '--output', '{tmp}/a.png'], 'no name of a picture'),
         (['knock-map', '--speeds', '3000:2000:5'], 'A:B:N with A below B'),
         (['knock-map', '--speeds', 'fast'], '--speeds is'),
+        (['knock-map', '--speeds', '20 Hz:30 mm:2'], "--speeds is '30 mm'"),
+        (['lobes', '--to', '3 kg'], "--to is '3 kg' rev/min"),
+        (['identify', 'tool=x.uff', '--from', '3 m', '--output', '{tmp}/m.yaml'], "'3 m' Hz"),
+        (['run', '--machine', 'nowhere.yaml'], 'The machine nowhere.yaml cannot be read'),
         (['knock-map', '--depths', '1'], '--depths is 1.0 m'),
         (['knock-map', '--depths', '0.0001:0.001:x'], 'A:B:N'),
         (['bench', 'luck'], "TOPIC is 'luck'"),
@@ -147,6 +151,60 @@ def test_knock_map_draws_tells_and_continues(
     assert points.read_bytes() == written
     assert cli.main([*call[:-1], '--tolerance', '0.2']) == 2
     assert 'holds another map' in capsys.readouterr().err
+
+
+HEAVY = (
+    '{tool: {modes: [{frequency: 50 Hz, damping_ratio: 4 %, mass: 3 t}]},'
+    ' workpiece: {modes: [{frequency: 22 Hz, damping_ratio: 4 %, mass: 40 t}]},'
+    ' material: {cutting_coefficient: 2000 MPa, errors: {cutting_coefficient: 10 %}},'
+    ' spindle: {slowest_speed: 2 rpm, fastest_speed: 100 rpm},'
+    ' cut: {spindle_speed: 30 rpm, depth_of_cut: 11 mm, feed: 1.5 mm/rev}}'
+)
+LIGHT = (
+    '{tool: {modes: [{frequency: 5 kHz, damping_ratio: 2 %, mass: 4 g}]},'
+    ' material: {cutting_coefficient: 800 MPa}, cut: {spindle_speed: 90000 rpm}}'
+)
+
+
+@pytest.mark.parametrize(
+    ('machine', 'more', 'low', 'high'),
+    [
+        (HEAVY, ['--workers', '1'], 2.0, 100.0),
+        (HEAVY, ['--from', '0.5 Hz', '--to', '80 rpm', '--uncertain', ''], 30.0, 80.0),
+        # 0.161 and 1.933 turns in a period of the workpiece's 103.5 Hz, and about the cut.
+        (LIGHT, [], 1000.0, 100_000.0),
+    ],
+    ids=['heavy', 'with units', 'light'],
+)
+def test_a_chart_suits_the_machine(
+    machine: str, more: list[str], low: float, high: float, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    call = ['lobes', '--machine', machine, '--output', str(tmp_path / 'a.png'), '--json', *more]
+    assert cli.main(call) == 0
+    told = capsys.readouterr()
+    figures = json.loads(told.out)
+    speeds = figures['spindle_speed_rpm']
+    assert (speeds[0], speeds[-1]) == (low, high)
+    assert ('cut' in figures) == (machine == HEAVY)
+    if 'cut' in figures:  # the limit of 12.1 mm is inverse to C, which is known to 10 %
+        assert 0.6 < figures['cut']['stable_with'] < 0.99
+        assert 'At 30 rev/min 11 mm is stable with' in told.err
+
+
+def test_knock_map_is_of_the_cut_of_its_machine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    points = tmp_path / 'points.jsonl'
+    call = ['knock-map', '--machine', HEAVY, '--depths', '9 mm:13 mm:2', '--reach', '1.5',
+            '--step', '1.4', '--output', str(points), '--json']  # fmt: skip
+    assert cli.main(call) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [point['spindle_speed_rpm'] for point in told] == [30.0, 30.0]
+    assert [point['depth_of_cut'] for point in told] == pytest.approx([0.009, 0.013])
+    assert [point['margin'] for point in told] == ['none found', 'unstable']
+    assert cli.main(call) == 0  # the same map, by the text that is in the file
+    assert json.loads(capsys.readouterr().out) == told
 
 
 def test_bench_prints_figures(capsys: pytest.CaptureFixture[str]) -> None:
