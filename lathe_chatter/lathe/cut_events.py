@@ -98,14 +98,21 @@ def parse_knock(sentence: str) -> Knock | None:
     return None if time is None or impulse is None else Knock(time, impulse)
 
 
+_ON_THE_SHOP_FLOOR = {
+    'spindle_speed_rpm': ('', 1.0, 'rev/min'),
+    'depth_of_cut': ('depth', 1e3, 'mm'),
+    'bearing_clearance': ('clearance', 1e6, 'µm'),
+    'feed_speed': ('feed', 1e3, 'mm/s'),
+    'feed_per_revolution': ('feed', 1e3, 'mm/rev'),
+}
+"""Word, factor and unit of what an operator changes most."""
+
+
 def on_the_shop_floor(name: str, value: Any) -> str:
     """A field of a cut with its value, short and in the units of the shop floor."""
-    if name == 'depth_of_cut':
-        return f'depth {value * 1e3:g} mm'
-    if name == 'spindle_speed_rpm':
-        return f'{value:g} rev/min'
-    if name == 'bearing_clearance':
-        return f'clearance {value * 1e6:g} µm'
+    if name in _ON_THE_SHOP_FLOOR:
+        word, factor, unit = _ON_THE_SHOP_FLOOR[name]
+        return f'{word} {value * factor:g} {unit}'.lstrip()
     if name == 'bearing_contact':
         return f'contact {_shown(value)}'
     shown = f'{value:g}' if isinstance(value, float) else _shown(value)

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _REFINEMENTS, _BETWEEN, _CLOSE = 3, 6, 1e-5
 """Times that speeds are added about peaks, how many between two, and how near is near enough."""
+_LEAST_SHADE = 0.02
+"""Part of the largest growth rate that the colours of the other sign go to at least."""
 _MILLI = 1e3
 _USUAL = (0.161, 1.933)
 """Turns in a period of the most flexible mode, where nothing is said of the spindle: of the
@@ -226,10 +228,11 @@ def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:
     from matplotlib.colors import TwoSlopeNorm
 
     low, high = float(growth.growth_rate.min()), float(growth.growth_rate.max())
+    least = _LEAST_SHADE * max(-low, high) or 1.0
     # Grey to orange by way of white: the lines over it keep their colours.
     colours = axes.pcolormesh(
         growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
-        cmap='PuOr_r', norm=TwoSlopeNorm(0.0, min(low, -1.0), max(high, 1.0)),
+        cmap='PuOr_r', norm=TwoSlopeNorm(0.0, min(low, -least), max(high, least)),
         shading='gouraud', rasterized=True,
     )  # fmt: skip
     axes.figure.colorbar(colours, ax=axes, label='growth rate / s$^{-1}$', pad=0.01)
