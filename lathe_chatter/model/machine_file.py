@@ -12,7 +12,7 @@
     cut: {spindle_speed: 900 rpm, depth_of_cut: 0.5 mm, feed: 0.2 mm/rev}
 
 A bare number is SI. What is left out is the paper's, of which a bearing is the exception: a
-machine without one has no bearing clearance. docs/machine_file.md has every field.
+machine without one has no bearing clearance. docs/reference/machine_file.md has every field.
 """
 
 from __future__ import annotations
