@@ -42,7 +42,7 @@ ARROWS = {
     'dataset': {'model', 'samples', 'lathe', 'stability', 'scenario'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
-    'page': {'model', 'samples', 'stability', 'report'},
+    'page': {'model', 'samples', 'lathe', 'stability', 'recording', 'report'},
     'nodes': {
         *('model', 'samples', 'lathe', 'detection', 'supervisor', 'recording', 'scenario'),
         'precompile',
@@ -50,7 +50,7 @@ ARROWS = {
     },
     'cli': {
         *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'precompile'),
-        *('recording', 'scenario', 'dataset', 'report', 'paper', 'nodes', 'tap_test'),
+        *('recording', 'scenario', 'dataset', 'report', 'paper', 'page', 'nodes', 'tap_test'),
     },
 }
 """The packages from the bottom to the top, each with those below that it may use."""

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.model.parameters import cut_from, described_by, machine_from
 from lathe_chatter.page.board import finite
 from lathe_chatter.report.stability_chart import (
@@ -34,29 +36,40 @@ def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def stability_chart(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The limits of a lathe over the speeds of its spindle, SI and rev/min; no limit is null.
+    """The chart of a lathe from its parameters, see `draw_chart`.
 
     Raises:
         LatheChatterError: If the parameters describe no machine.
     """
     known = {name: value for name, value in values.items() if value is not None}
-    machine, cut, described = machine_from(known), cut_from(known), described_by(known)
     leaves = bool(known.get('tool_leaves_cut', True))
+    described = described_by(known)
+    return draw_chart(machine_from(known), cut_from(known), described, tool_leaves_cut=leaves)
+
+
+def draw_chart(
+    machine: Machine, cut: Cut, described: MachineDescription | None, *, tool_leaves_cut: bool
+) -> dict[str, Any]:
+    """The limits over the speeds of a spindle, SI and rev/min; no limit is null.
+
+    Where the machine is known with errors, the depths that are stable with some probabilities
+    too.
+    """
     spindle = described.speed_range if described else None
     low, high = spindle or usual_speeds(machine, cut)
-    limits = chart_limits(machine, cut, chart_speeds(low, high), tool_leaves_cut=leaves)
+    speeds = chart_speeds(low, high)
+    limits = chart_limits(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut)
     found: dict[str, Any] = {name: finite(getattr(limits, name)) for name in LIMITS}
     found['speed'] = limits.spindle_speed_rpm.tolist()
     found['contact'] = cut.bearing_contact.value
     found['top'] = top_of_chart(cut, limits)
     if described is not None and described.uncertainty:
+        speeds = chart_speeds(low, high, _SPEEDS)
         probable = stability_probability(
-            machine, described.uncertainty, cut, chart_speeds(low, high, _SPEEDS),
-            machines=_MACHINES, tool_leaves_cut=leaves,
+            machine, described.uncertainty, cut, speeds, machines=_MACHINES,
+            tool_leaves_cut=tool_leaves_cut,
         )  # fmt: skip
         for share in _PROBABILITIES:
-            depth = np.interp(
-                limits.spindle_speed_rpm, probable.spindle_speed_rpm, probable.safe_depth(share)
-            )
+            depth = np.interp(found['speed'], speeds, probable.safe_depth(share))
             found[f'stable_{share:.0%}'] = finite(depth)
     return found

@@ -15,8 +15,11 @@ import contextlib
 import hmac
 import ipaddress
 import json
+import os
 import socket
+import sys
 import time
+import webbrowser
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -329,3 +332,9 @@ def _is_loopback(host: str) -> bool:
     with contextlib.suppress(ValueError):
         return ipaddress.ip_address(host).is_loopback
     return host == 'localhost'
+
+
+def open_in_browser(url: str) -> None:
+    """Open a page, where there is a screen to see it on."""
+    if sys.platform == 'darwin' or os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY'):
+        webbrowser.open(url)

@@ -74,7 +74,7 @@ function drawSignals(id, what, times, values, height, onSelect) {
     height, legend: {show: true, live: false},
     series: [{}, line('tool', 'tool'), line('workpiece', 'workpiece')],
     scales: {x: {time: false}, y: {range: room(factor * (what === 'displacement' ? 1e-8 : 1e-5))}},
-    axes: [axis('simulated time / s'), axis(`${what} / ${unit.includes('/') ? `(${unit})` : unit}`, {side: 3})],
+    axes: [axis('simulated time / s'), axis(height < 150 ? unit : `${what} / ${unit.includes('/') ? `(${unit})` : unit}`, {side: 3})],
     cursor: {show: !!onSelect, drag: {x: true, y: false, setScale: false}},
     hooks: onSelect ? {setSelect: [u => {
       if (u.select.width > 4) {
@@ -146,6 +146,7 @@ function clip(u) {
   u.ctx.beginPath();
   u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
   u.ctx.clip();
+  u.ctx.setLineDash([]);
 }
 
 function dot(ctx, x, y, radius) {
@@ -164,6 +165,7 @@ function upright(u, x, colour, label, dash = []) {
   ctx.stroke();
   ctx.setLineDash([]);
   if (!label) return;
+  ctx.textAlign = 'left';
   ctx.font = `${12 * devicePixelRatio}px system-ui`;
   const left = at + 4 * devicePixelRatio, width = ctx.measureText(label).width;
   ctx.fillText(label, Math.min(left, bbox.left + bbox.width - width), bbox.top + 12 * devicePixelRatio);
@@ -176,7 +178,7 @@ function drawSpectrum(amplitudes, step, speed, chatter) {
   plot('spectrum', 'spectrum', () => ({
     height: 220, legend: {show: false},
     scales: {x: {time: false}, y: {distr: 3, range: (u, low, high) => [Math.max(high / 1e5, 1e-7), high * 2]}},
-    axes: [axis('frequency / Hz'), axis('amplitude / µm', {side: 3})],
+    axes: [axis('frequency / Hz'), axis('amplitude / µm', {side: 3, values: (u, list) => list.map(v => (v && Number.isInteger(Math.log10(v)) ? v.toExponential(0) : ''))})],
     series: [{}, {stroke: () => css('tool'), width: 1, points: {show: false}}],
     hooks: {draw: [u => {
       clip(u);

@@ -96,7 +96,7 @@ function take(header, arrays) {
   }
   if (header.page) takePage(header.page);
   if (header.server) takeServer(header.server);
-  if (header.run) takeRun(header, arrays);
+  if (header.view) takeView(header.view, arrays);
   if (header.cell) takeCell(header.cell);
   if (header.signals) takeSignals(header.signals, arrays);
   if (header.closeup) takeCloseup(header.closeup, arrays);
@@ -113,6 +113,7 @@ function takePage(news) {
     if (news.lathes.length && (!cell.name || cell.name !== $('lathes').value)) choose();
     else if (!news.lathes.length) showGone('No lathe is there yet. The page waits for one.');
   }
+  if (recorded) takeRun(news);
   if (news.scenarios) $('scenario').replaceChildren(...news.scenarios.map(name => new Option(name)));
 }
 
@@ -128,6 +129,7 @@ function takeServer(news) {
   $('operate').textContent = server.operating ? 'Look on' : free ? 'Operate' : 'Take over';
   $('operate').setAttribute('aria-pressed', String(server.operating));
   $('operate').disabled = !server.trusted;
+  if (recorded) return;
   const who = server.operating ? 'you operate' : free ? 'nobody operates' : `${server.operator} operates`;
   $('viewers').textContent = `${server.viewers} ${server.viewers === 1 ? 'viewer' : 'viewers'}, ${who}. You are ${server.you}${server.trusted ? '' : ', without the token: you may look, and not act'}.`;
   lock();
@@ -135,6 +137,7 @@ function takeServer(news) {
 
 // What may be pressed now, and what not.
 function lock() {
+  if (recorded) return;
   const mine = server.operating && socket.readyState === WebSocket.OPEN;
   document.querySelectorAll('.act').forEach(each => { each.disabled = !mine; });
   recommended = cell.figures?.recommended_speed_rpm;
@@ -175,7 +178,7 @@ function showAlive() {
 }
 
 function showLamp() {
-  const {flag, state, alive} = cell, known = flag && alive?.monitor;
+  const {flag, state, alive} = cell, known = flag && (recorded || alive?.monitor);
   $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
   const word = !known ? 'unknown' : flag.up ? 'CHATTER' : state ?? 'no chatter';
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
@@ -293,7 +296,11 @@ function showChart() {
   }
   drawChart(chart, point, trail, recommended, cell.flag?.up);
   const k = point ? chart.speed.findIndex(speed => speed >= point.speed) : -1;
-  const limit = name => (chart[name][k] == null ? 'none' : `${(chart[name][k] * MILLI).toFixed(3)} mm`);
+  const share = k > 0 ? (point.speed - chart.speed[k - 1]) / (chart.speed[k] - chart.speed[k - 1]) : 1;
+  const limit = name => {
+    const [low, high] = [chart[name][Math.max(k - 1, 0)], chart[name][k]];
+    return low == null || high == null ? 'none' : `${number((low + share * (high - low)) * MILLI)} mm`;
+  };
   const text = k < 0 ? '' : `The cut: ${point.speed.toFixed(0)} rev/min, ${(point.depth * MILLI).toFixed(3)} mm. Small disturbances die out there up to ${limit('depth_of_cut')}; limit open ${limit('open_limit')}${chart.contact === 'none' ? '' : `, on its bearing ${limit('seated_limit')}`}.${cell.charting ? ' The chart is being computed anew ...' : ''}`;
   if ($('chart-text').textContent !== text) {
     $('chart-text').textContent = text;
@@ -434,4 +441,4 @@ if (given) {
   sessionStorage.setItem('token', given);
   history.replaceState(null, '', location.pathname);
 }
-connect();
+addEventListener('load', connect);

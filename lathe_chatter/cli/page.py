@@ -1,0 +1,46 @@
+"""`lathe-chatter page`: a recorded run in the browser, to scrub through."""
+
+from __future__ import annotations
+
+import asyncio
+from argparse import ArgumentParser, Namespace
+from contextlib import suppress
+
+from lathe_chatter.cli.common_options import add_run
+from lathe_chatter.cli.console import Screen
+from lathe_chatter.page.recorded_run import RecordedRun
+from lathe_chatter.page.server import PageServer, open_in_browser
+
+NAME = 'page'
+HELP = 'show a recorded run in the browser: scrub, zoom to a sample, the path over the chart'
+EXAMPLE = 'lathe-chatter page runs/20260401-120000'
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    add_run(parser)
+    parser.add_argument(
+        '--port',
+        type=int,
+        default=0,
+        metavar='N',
+        help='port to serve it on (default: a free one)',
+    )
+
+
+def run(options: Namespace) -> int:
+    """Serve the page until Ctrl-C."""
+    screen = Screen()
+    shown = RecordedRun(options.run_path)
+    server = PageServer(shown, '127.0.0.1', options.port)
+    screen.say(f'{options.run_path} is at {server.url} until Ctrl-C.')
+    open_in_browser(server.url)
+
+    async def serve() -> None:
+        reading = asyncio.create_task(shown.read())
+        await server.run()
+        reading.cancel()
+
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serve())
+    return 0

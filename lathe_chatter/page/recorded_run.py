@@ -1,0 +1,286 @@
+"""A recorded run as a page shows it: all of it at once, any part of it closely, any moment.
+
+The first picture is made of some chunks of the file; then all samples pass by, and what is shown
+gets complete. What is looked at closely is read from the file when it is asked for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe.cut_events import on_the_shop_floor
+from lathe_chatter.page.board import Board
+from lathe_chatter.page.chart import draw_chart
+from lathe_chatter.page.live_signals import SIGNALS, closeup
+from lathe_chatter.page.server import Viewer
+from lathe_chatter.recording import read_run
+from lathe_chatter.recording.chunk_messages import messages_of
+from lathe_chatter.recording.mcap_file import RecordedFile
+from lathe_chatter.recording.mcap_reader import Chunk, record_at
+from lathe_chatter.report.operating_points import stays_of
+from lathe_chatter.report.run_history import History, read_history, value_near
+from lathe_chatter.samples.codec import SampleDecoder
+
+COLUMNS = ('time', 'spindle_angle', *SIGNALS)
+_GLANCES = 150
+"""Chunks that the first picture is made of."""
+_POINTS = 1000
+"""Stretches of a picture."""
+_FEWEST, _STRETCH, _MOST = 500, 0.002, 2_000_000
+"""Stretches that suffice for a picture; their length, s, at least; and how many are kept."""
+_CLOSEUP = 1.0
+_SLACK = 300_000_000
+"""ns about a time of reception within which a sample is looked for."""
+_ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
+
+
+class RecordedRun:
+    """What a page has of a recorded run.
+
+    Args:
+        path: Of the run.
+
+    Raises:
+        RunReadError: If there is no such run, or it has no samples.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Glance at the run; `read` reads it."""
+        self._path, self._run = path, read_run(path, damaged=True)
+        self._topic = self._run.samples_topic()
+        self._board = Board()
+        self._history: History | None = None
+        self._chart_of: Any = None
+        glances = [*self._glances()]
+        if not glances:
+            raise self._run.without_samples(self._topic)
+        # Of each place that was read: simulated time from the start of the run on, the same less
+        # that of the samples, and the time of reception.
+        self._places = np.array([place for place, _, _ in glances])
+        self._low: Array = np.array([low for _, low, _ in glances])
+        self._high: Array = np.array([high for _, _, high in glances])
+        self._times: Array = self._places[:, 0]
+        self._show(float(self._times[-1]), 'The first picture is of some places only.')
+        for name, value in (('recorded', True), ('scenarios', []), ('lathes', [self._topic])):
+            self._board.put(name, value)
+
+    def _show(self, end: float, state: str) -> None:
+        begin = float(self._times[0])
+        self._board.put('run', {'name': str(self._path), 'begin': begin, 'end': end,
+                                'state': state, 'version': len(self._times)})  # fmt: skip
+
+    # -- reading ---------------------------------------------------------------------------
+
+    def _glances(self) -> Iterator[tuple[tuple[float, float, float], Array, Array]]:
+        """Some chunks of each file: where, and their smallest and largest values."""
+        offset, last = 0.0, -math.inf
+        for file in self._run.opened:
+            places = file.known.chunks
+            every = max(1, len(places) * len(self._run.opened) // _GLANCES)
+            for place in [*places[::every], *places[-1:]]:
+                block, received = self._chunk(file, place.offset)
+                if len(block):
+                    if block[0, 0] + offset <= last:
+                        offset = last
+                    last = float(block[-1, 0]) + offset
+                    where = float(block[0, 0]) + offset, offset, float(received[0])
+                    yield where, block[:, 2:].min(axis=0), block[:, 2:].max(axis=0)
+        if last == -math.inf:  # a file without an index
+            for part in self._run.sample_blocks(self._topic):
+                if part.times.size:
+                    values = _picked(part)[:, 2:]
+                    where = part.times[0], 0.0, float(part.log_times[0])
+                    yield where, values.min(axis=0), values.max(axis=0)
+
+    def _chunk(self, file: RecordedFile, offset: int) -> tuple[Array, Integers]:
+        """The samples of a chunk (n, 6), and when each was received, ns."""
+        none = np.zeros((0, len(COLUMNS))), np.zeros(0, np.int64)
+        chunk = record_at(file.path, offset)
+        if not isinstance(chunk, Chunk):
+            return none  # damaged: `read` says so
+        messages = messages_of(chunk).of(*file.channels_of(self._topic))
+        decoder, blocks, received = SampleDecoder(), [], []
+        for k in range(len(messages.heads)):
+            samples, columns = decoder.decode(messages.payload(k))
+            picked = [columns.index(name) if name in columns else -1 for name in COLUMNS]
+            blocks.append(np.where(np.array(picked) >= 0, samples[:, picked], np.nan))
+            received.append(np.full(len(samples), messages.heads['log_time'][k], np.int64))
+        return (np.concatenate(blocks), np.concatenate(received)) if blocks else none
+
+    async def read(self) -> None:
+        """Let all samples pass by, then find out what happened."""
+        try:
+            await asyncio.to_thread(self._read_all)
+            self._history = await asyncio.to_thread(read_history, self._path)
+            self._tell_history(self._history)
+        except LatheChatterError as error:
+            self._show(float(self._times[-1]), f'What happened cannot be read: {error}')
+
+    def _read_all(self) -> None:
+        end = float(self._times[-1])
+        length = max(_STRETCH, end / _MOST)
+        numbers: list[Integers] = []
+        lows: list[Any] = []
+        highs: list[Any] = []
+        places: list[Array] = []
+        offset, last, shown = 0.0, -math.inf, -math.inf
+        for part in self._run.sample_blocks(self._topic, COLUMNS):
+            times = part.times
+            if not times.size:
+                continue
+            first = np.cumsum(part.rows) - part.rows
+            first = first[part.rows > 0]
+            begins = [0, *(np.flatnonzero(np.diff(times) <= 0.0) + 1).tolist()]
+            for begin, stop in zip(begins, [*begins[1:], len(times)], strict=True):
+                if times[begin] + offset <= last:
+                    offset = last
+                on_axis = times[begin:stop] + offset
+                last = float(on_axis[-1])
+                number = np.floor(on_axis / length + 1e-6).astype(np.int64)
+                change = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
+                values = _picked(part)[begin:stop, 2:]
+                numbers.append(number[change])
+                # As float32, of which an hour takes 60 MB.
+                lows.append(np.minimum.reduceat(values, change).astype(np.float32))
+                highs.append(np.maximum.reduceat(values, change).astype(np.float32))
+                inside = np.flatnonzero((first >= begin) & (first < stop))[::16]
+                received = part.log_times[part.rows > 0][inside]
+                on = times[first[inside]] + offset
+                places.append(np.column_stack((on, np.full(len(on), offset), received)))
+            if last - shown > 0.05 * end:
+                shown = last
+                self._board.put('reading', min(1.0, last / max(end, 1e-9)))
+        self._places = np.concatenate(places)
+        self._low, self._high = np.concatenate(lows), np.concatenate(highs)
+        self._times = np.concatenate(numbers).astype(float) * length
+        self._board.put('reading', None)
+        damage = '; '.join(f'{d.file.name}: {d.reason}' for d in self._run.damage)
+        self._show(last, f'Not all can be read: {damage}.' if damage else '')
+
+    def _closely(self, begin: float, end: float) -> Array:
+        """The samples between two times of the run, s, by times of the run (n, 6)."""
+        on, offset, received = self._places.T
+        from_, to = np.interp((begin, end), on, received)
+        ours = float(offset[max(int(np.searchsorted(on, end, 'right')) - 1, 0)])
+        found: list[Array] = [np.zeros((0, len(COLUMNS)))]
+        for file in self._run.opened:
+            found += [
+                self._chunk(file, place.offset)[0]
+                for place in file.known.chunks
+                if place.first <= to + _SLACK and place.last >= from_ - _SLACK
+            ]
+        samples = np.concatenate(found)
+        samples[:, 0] += ours
+        inside = (samples[:, 0] >= begin) & (samples[:, 0] <= end)
+        return samples[inside]
+
+    # -- what is shown ---------------------------------------------------------------------
+
+    def frame(self, viewer: Viewer) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What is new for a viewer."""
+        header: dict[str, Any] = {}
+        if news := self._board.news(viewer.seen.setdefault('page', {})):
+            header['page'] = news
+        pictures = viewer.cursors.get('pictures')
+        more, arrays = pictures.pop(0) if pictures else ({}, {})
+        return {**header, **more}, arrays
+
+    async def look(self, viewer: Viewer, wish: Mapping[str, Any]) -> bool:
+        """Show a part of the run, or a moment."""
+        if wish['do'] == 'view':
+            begin, end = float(wish['from']), float(wish['to'])
+            picture = await asyncio.to_thread(self._view, begin, end, str(wish['plot'])[:20])
+        elif wish['do'] == 'at':
+            picture = await asyncio.to_thread(self._moment, float(wish['time']))
+        else:
+            return bool(wish['do'] == 'choose')
+        viewer.cursors.setdefault('pictures', []).append(picture)
+        return True
+
+    async def act(self, viewer: Viewer, wish: Mapping[str, Any]) -> str:  # noqa: ARG002 -- a source's
+        """Nothing can be done to a recorded run."""
+        raise LatheChatterError(f'A recorded run is only looked at: {wish["do"]!r:.40} cannot be.')
+
+    def _view(self, begin: float, end: float, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+        """A part of the run as the smallest and largest values of some stretches."""
+        times = self._times
+        first, stop = np.searchsorted(times, (begin, end))
+        inside = slice(max(int(first) - 1, 0), int(stop) + 1)
+        times, low, high = times[inside], self._low[inside], self._high[inside]
+        if len(times) < _FEWEST and end - begin < _FEWEST * _STRETCH:
+            samples = self._closely(begin, end)
+            times, low = samples[:, 0], samples[:, 2:]
+            high = low
+        if len(times) > _POINTS:
+            # Stretches of one length in time, so that what is missing stays open.
+            number = ((times - times[0]) * (_POINTS / (times[-1] - times[0] + 1e-12))).astype(int)
+            starts = np.flatnonzero(np.diff(number, prepend=-1))
+            low, high = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+            times = times[starts]
+        shown = {'from': begin, 'to': end, 'plot': name}
+        return {'view': shown}, {'times': times - begin, 'values': np.stack((low, high))}
+
+    def _moment(self, time: float) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Portraits and spectrum just before a time, and what was known then."""
+        samples = self._closely(time - _CLOSEUP, time)
+        figures, arrays = closeup(samples) if len(samples) > 1 else ({}, {})
+        cell: dict[str, Any] = {}
+        history = self._history
+        if history is not None:
+            cut = history.cut_at(time)
+            figures['depth'] = cut.depth_of_cut
+            figures['speed'] = figures.get('speed') or cut.spindle_speed_rpm
+            before = [flag for flag in history.flags if flag.time <= time]
+            cell['flag'] = {'up': False, 'since': None}
+            if before:
+                cell['flag'] = {'up': before[-1].chatter, 'since': before[-1].time}
+            cell['figures'] = {
+                name: value_near(series, time)
+                for name, series in history.estimates.items()
+                if name in _ESTIMATES and np.any(np.abs(series[0] - time) < 1.0)
+            }
+            cell['chart'] = self._chart(history, time)
+        return {'closeup': figures, 'cell': cell, 'moment': time}, arrays
+
+    def _chart(self, history: History, time: float) -> Any:
+        """The chart that held at a time; a new one only where it is another."""
+        session, cut = history.session_at(time), history.cut_at(time)
+        key = session.machine, session.tool_leaves_cut, cut.with_changes(
+            spindle_speed_rpm=3000.0, depth_of_cut=0.0
+        )  # fmt: skip
+        if self._chart_of is None or self._chart_of[0] != key:
+            leaves = session.tool_leaves_cut
+            chart = draw_chart(session.machine, cut, session.described, tool_leaves_cut=leaves)
+            self._chart_of = key, chart
+        return self._chart_of[1]
+
+    def _tell_history(self, history: History) -> None:
+        """What happened, in order."""
+        found = [(session.time, session.why) for session in history.later_sessions]
+        for change in history.changes:
+            words = ', '.join(on_the_shop_floor(*each) for each in change.new.items())
+            found.append((change.time, words))
+        found += [(knock.time, f'knock, {knock.impulse * 1e3:g} mN s') for knock in history.knocks]
+        found += [
+            (flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
+            for flag in history.flags
+        ]
+        self._board.put('events', [list(event) for event in sorted(found)])
+        self._board.put('flags', history.chatter_spans())
+        points = [stay.cut for stay in stays_of(history)]
+        self._board.put('path', [[cut.spindle_speed_rpm, cut.depth_of_cut] for cut in points])
+
+
+def _picked(part: Any) -> Array:
+    """The COLUMNS of some blocks (n, 6), nan where there is no such column."""
+    none = np.full(part.times.size, np.nan)
+    rows = [part.signals[part.columns.index(n)] if n in part.columns else none for n in COLUMNS]
+    return np.column_stack(rows)
