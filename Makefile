@@ -1,5 +1,5 @@
 # Two commands are all there is to know: `make run` and `make test`. Both install what they need.
-.PHONY: help run test test-core test-kilted lint docs everywhere bounds lock clean
+.PHONY: help run page test test-core test-kilted lint docs everywhere bounds lock clean
 .DEFAULT_GOAL := help
 
 # Nodes of this checkout talk on this machine only, unless the user has said otherwise.
@@ -13,6 +13,7 @@ TALKS_TO_ROS = tests/nodes tests/cli/test_run.py
 help:
 	@echo 'make run   the main job: a virtual lathe chatters, is flagged and cured; the run is kept'
 	@echo '           (make run ARGS="--scenario no_clearance" for another scenario)'
+	@echo 'make page  the same machine under your own hands: a page in the browser'
 	@echo 'make test  every test (make test ARGS="tests/recording -x" for some)'
 	@echo 'make lint  style and types'
 	@echo 'make docs  the documentation as a site: docs/_build/html/index.html'
@@ -24,6 +25,9 @@ help:
 
 run:
 	@python=$$(scripts/environment) && "$$python" -m lathe_chatter.cli run $(ARGS)
+
+page:
+	@python=$$(scripts/environment) && "$$python" -m lathe_chatter.cli run --page $(ARGS)
 
 lint:
 	@python=$$(scripts/environment lint) && "$$python" -m ruff check . \

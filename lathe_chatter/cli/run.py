@@ -22,7 +22,6 @@ from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,
-    Scenario,
     find_scenario,
     load_scenario,
 )
@@ -47,6 +46,11 @@ def configure(parser: ArgumentParser) -> None:
         '--machine', metavar='FILE',
         help="machine file in place of the scenario's: a path, or the name of one that is shipped",
     )  # fmt: skip
+    parser.add_argument(
+        '--page', action='store_true',
+        help="open the operator's page in the browser and play nothing: whoever has it open "
+        'operates, and may play scenarios, until Ctrl-C',
+    )  # fmt: skip
     add_json(parser)
 
 
@@ -62,18 +66,22 @@ def run(options: Namespace) -> int:
     if utf8('--output', output).exists():
         raise RunFailedError(f'{output} exists already: give another --output.')
     screen = Screen(json=options.json)
-    screen.say(f'{scenario.title}  (scenario {scenario.name})', 'bold')
+    if not options.page:
+        screen.say(f'{scenario.title}  (scenario {scenario.name})', 'bold')
     play = _player()
     screen.compile()
-    interrupted = play(scenario, file, output, screen)
+    interrupted = play(scenario, file, output, screen, page=options.page)
     if interrupted and not _has_samples(output):
         shutil.rmtree(output, ignore_errors=True)  # else it would pass for a run
         screen.say('Interrupted before anything was recorded.')
         return INTERRUPTED
     if interrupted:
-        screen.say('Interrupted: the run is finished and reported ...')
+        word = 'Ended' if options.page else 'Interrupted'
+        screen.say(f'{word}: the run is finished and reported ...')
     history = read_history(output)
     screen.json(show_run(history, screen))
+    if options.page:
+        return 0  # there is no other way to end it
     if interrupted:
         screen.say('Interrupted: the run above is recorded up to that moment.')
         return INTERRUPTED
@@ -94,7 +102,7 @@ def _has_samples(output: Path) -> bool:
         return False
 
 
-def _player() -> Callable[[Scenario, Path, Path, Screen], bool]:
+def _player() -> Callable[..., bool]:
     """What plays a scenario with a cell of nodes.
 
     Raises:

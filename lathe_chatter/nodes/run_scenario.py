@@ -14,13 +14,14 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from lathe_chatter.errors import RunFailedError
+from lathe_chatter.errors import NodeFailedError, RunFailedError
 from lathe_chatter.model.parameters import LATHE
 from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameters import MONITOR
+from lathe_chatter.page.server import answers, free_port, open_in_browser
 from lathe_chatter.scenario import Scenario
 
 try:
@@ -55,7 +56,9 @@ class Screen(Protocol):
         """Show a bar of progress, which has `show(done, what=...)`."""
 
 
-def play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
+def play(
+    scenario: Scenario, file: Path, output: Path, screen: Screen, *, page: bool = False
+) -> bool:
     """Start the cell, play, and end the cell.
 
     Args:
@@ -63,6 +66,8 @@ def play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
         file: Of the scenario, to be kept in the run.
         output: Folder of the run, to make.
         screen: Where to tell what happens.
+        page: Whether nothing is played, and whoever has the operator's page open operates,
+            until it is interrupted.
 
     Returns:
         Whether it was interrupted.
@@ -89,7 +94,8 @@ def play(scenario: Scenario, file: Path, output: Path, screen: Screen) -> bool:
                 held.deliver()
 
             try:
-                return _play(operator, spin, file, output, screen)
+                follow = _serve_page if page else _follow
+                return _play(operator, spin, file, output, screen, follow)
             finally:
                 _let_graph_settle(executor)
                 executor.shutdown()
@@ -115,8 +121,13 @@ def _free_domain(screen: Screen) -> Iterator[None]:
             del os.environ['ROS_DOMAIN_ID']
 
 
-def _play(
-    operator: Operator, spin_once: Callable[[], None], file: Path, output: Path, screen: Screen
+def _play(  # noqa: PLR0913, PLR0917 -- what is played, where to, and how
+    operator: Operator,
+    spin_once: Callable[[], None],
+    file: Path,
+    output: Path,
+    screen: Screen,
+    follow: Callable[[Operator, Callable[[], None], Screen], None],
 ) -> bool:
     """Play with an operator who is there; whether it was interrupted."""
     interrupted = False
@@ -146,8 +157,7 @@ def _play(
                 'lathe',
                 parameter_arguments({'await_readers': _READERS, **operator.scenario.parameters}),
             )
-            operator.playing = True
-            _follow(operator, spin, screen)
+            follow(operator, spin, screen)
         except KeyboardInterrupt:
             interrupted = True
         complaints = cell.end()
@@ -206,6 +216,7 @@ def _await_nodes(operator: Operator, spin: Callable[[], None]) -> None:
 def _follow(operator: Operator, spin: Callable[[], None], screen: Screen) -> None:
     """Spin until the scenario is played, with a bar of simulated time."""
     scenario = operator.scenario
+    operator.playing = True
     until = time.monotonic() + _START_PATIENCE
     with screen.progress('waiting for the lathe', scenario.duration, 's') as bar:
         while not _finished(operator, scenario):
@@ -221,6 +232,29 @@ def _follow(operator: Operator, spin: Callable[[], None], screen: Screen) -> Non
                 min(operator.time, scenario.duration),
                 what=operator.state if operator.time else 'waiting for the lathe',
             )
+
+
+def _serve_page(operator: Operator, spin: Callable[[], None], screen: Screen) -> None:
+    """Serve the operator's page until Ctrl-C; one that was killed is started again."""
+    port = free_port()
+    url = f'http://127.0.0.1:{port}/'
+    opened = False
+    with ProcessGroup() as pages:
+        pages.start('operator_page', parameter_arguments({'port': port}))
+        with screen.working(f'The page is at {url} until Ctrl-C ...'):
+            while True:
+                spin()
+                _refuse_company(operator)
+                try:
+                    pages.check()
+                except NodeFailedError as error:
+                    screen.say(f'{error} It is started again.')
+                    pages.end()
+                    pages.start('operator_page', parameter_arguments({'port': port}))
+                if not opened and answers(port):
+                    opened = True
+                    screen.say(f'The page is at {url} until Ctrl-C.')
+                    open_in_browser(url)
 
 
 def _finished(operator: Operator, scenario: Scenario) -> bool:

@@ -169,16 +169,16 @@ class RecordedRun:
         """The samples between two times of the run, s, by times of the run (n, 6)."""
         on, offset, received = self._places.T
         from_, to = np.interp((begin, end), on, received)
-        ours = float(offset[max(int(np.searchsorted(on, end, 'right')) - 1, 0)])
-        found: list[Array] = [np.zeros((0, len(COLUMNS)))]
-        for file in self._run.opened:
-            found += [
-                self._chunk(file, place.offset)[0]
-                for place in file.known.chunks
-                if place.first <= to + _SLACK and place.last >= from_ - _SLACK
-            ]
-        samples = np.concatenate(found)
-        samples[:, 0] += ours
+        found = [
+            self._chunk(file, place.offset)
+            for file in self._run.opened
+            for place in file.known.chunks
+            if place.first <= to + _SLACK and place.last >= from_ - _SLACK
+        ]
+        samples = np.concatenate([np.zeros((0, len(COLUMNS))), *(block for block, _ in found)])
+        times = np.concatenate([np.zeros(0), *(times for _, times in found)])
+        # Which session a sample is of is told by when it came.
+        samples[:, 0] += offset[np.maximum(np.searchsorted(received, times, 'right') - 1, 0)]
         inside = (samples[:, 0] >= begin) & (samples[:, 0] <= end)
         return samples[inside]
 

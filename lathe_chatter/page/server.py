@@ -334,6 +334,20 @@ def _is_loopback(host: str) -> bool:
     return host == 'localhost'
 
 
+def free_port(first: int = 8080) -> int:
+    """The first port from one on that nobody on this machine has."""
+    while answers(first):
+        first += 1
+    return first
+
+
+def answers(port: int) -> bool:
+    """Whether somebody listens on a port of this machine."""
+    with contextlib.suppress(OSError), socket.create_connection(('127.0.0.1', port), 0.5):
+        return True
+    return False
+
+
 def open_in_browser(url: str) -> None:
     """Open a page, where there is a screen to see it on."""
     if sys.platform == 'darwin' or os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY'):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import os
 import re
@@ -291,3 +292,30 @@ def test_two_runs_at_once_get_along_even_with_sigint_ignored(
     assert any('this one takes' in each for each in said), said
     for number in range(2):
         assert (tmp_path / f'run {number}' / 'metadata.yaml').is_file()
+
+
+def test_with_the_page_it_runs_until_it_is_told_to_end(environment: Any, tmp_path: Path) -> None:
+    output = tmp_path / 'run'
+    process = subprocess.Popen(
+        [*command('--page', '--output', str(output))],
+        env={**environment, 'PYTHONUNBUFFERED': '1', 'DISPLAY': '', 'WAYLAND_DISPLAY': ''},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    url = ''
+    while not url:
+        line = process.stdout.readline()
+        assert line, process.stderr.read() if process.stderr else ''
+        if found := re.search(r'The page is at (http://\S+) until Ctrl-C\.\n', line):
+            url = found[1]
+    asked = http.client.HTTPConnection(url.split('/')[2])
+    asked.request('GET', '/')
+    assert b'<title>Lathe</title>' in asked.getresponse().read()
+    time.sleep(3.0)
+    process.send_signal(signal.SIGINT)
+    said, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert 'Ended: the run is finished' in said
+    assert main(['verify', str(output)]) == 0

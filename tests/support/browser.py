@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import time
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -108,14 +107,12 @@ class Browser:
             raise AssertionError(found['exceptionDetails'])
         return found['result'].get('value')
 
-    def until(
-        self, script: str, what: str, patience: float = PATIENCE, also: Callable[[], Any] = bool
-    ) -> Any:
+    def until(self, script: str, what: str, patience: float = PATIENCE) -> Any:
         """Wait until an expression is true; its value."""
         until = time.monotonic() + patience
-        while not (value := self.run(script)):
+        plain = f'(v => v instanceof Element ? v.outerHTML : v)({script})'
+        while not (value := self.run(plain)):
             assert time.monotonic() < until, f'{what} did not come: {self.complaints}'
-            also()
             time.sleep(0.05)
         return value
 

@@ -1,0 +1,175 @@
+"""A recorded run in the page: what is sent is what is in the file, and a browser scrubs it."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.browser import Browser, chromium
+
+from lathe_chatter.cli.main import main
+from lathe_chatter.errors import RunReadError
+from lathe_chatter.lathe.config import recorded_config
+from lathe_chatter.model.parameters import parameters_of
+from lathe_chatter.page.live_signals import SIGNALS
+from lathe_chatter.page.recorded_run import RecordedRun
+from lathe_chatter.page.server import Viewer
+from lathe_chatter.recording import LatheRun, read_run
+
+PATIENCE = 120.0
+
+
+@pytest.fixture(scope='module')
+def run(tmp_path_factory: Any) -> Path:
+    """Twelve seconds: a cut that chatters when it gets deeper, and is cured."""
+    folder = Path(tmp_path_factory.mktemp('recorded')) / 'run'
+    assert main(['simulate', '--scenario', 'clearance', '--output', str(folder)]) == 0
+    return folder
+
+
+def look(shown: RecordedRun, **wish: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    viewer = Viewer('a test', trusted=False)
+    assert asyncio.run(shown.look(viewer, wish))
+    return shown.frame(viewer)
+
+
+def columns(arrays: dict[str, Any]) -> Any:
+    """Smallest and largest values by signal (2, n, 4)."""
+    return np.asarray(arrays['values'])
+
+
+@pytest.mark.parametrize('read', [False, True])
+@pytest.mark.parametrize(('begin', 'end'), [(4.0, 4.05), (3.9, 4.6), (11.99, 20.0)])
+def test_a_close_look_is_every_sample_before_and_after_all_is_read(
+    run: Path, begin: float, end: float, read: bool
+) -> None:
+    shown = RecordedRun(run)
+    if read:
+        asyncio.run(shown.read())
+    header, arrays = look(shown, do='view', plot='part', **{'from': begin, 'to': end})
+    samples = read_run(run).samples(start=begin, end=end)
+    assert header['view'] == {'from': begin, 'to': end, 'plot': 'part'}
+    low, high = columns(arrays)
+    assert len(low) <= 1001
+    for k, name in enumerate(SIGNALS):
+        assert low[:, k].min() == pytest.approx(samples.columns[name].min(), rel=1e-6)
+        assert high[:, k].max() == pytest.approx(samples.columns[name].max(), rel=1e-6)
+    if end - begin < 0.1:
+        times = begin + np.asarray(arrays['times'])
+        np.testing.assert_allclose(times, samples.columns['time'], atol=1e-9)
+        np.testing.assert_array_equal(low[:, 0], samples.columns[SIGNALS[0]])
+
+
+def test_the_whole_is_the_smallest_and_largest_of_all(run: Path) -> None:
+    shown = RecordedRun(run)
+    asyncio.run(shown.read())
+    _, arrays = look(shown, do='view', plot='overview', **{'from': 0.0, 'to': 12.0})
+    samples = read_run(run).samples()
+    low, high = columns(arrays)
+    for k, name in enumerate(SIGNALS):
+        assert low[:, k].min() == pytest.approx(samples.columns[name].min(), rel=1e-6)
+        assert high[:, k].max() == pytest.approx(samples.columns[name].max(), rel=1e-6)
+
+
+def test_a_moment_has_the_cut_the_flag_and_the_frequency_of_then(run: Path) -> None:
+    shown = RecordedRun(run)
+    asyncio.run(shown.read())
+    header, arrays = look(shown, do='at', time=4.1)
+    figures, cell = header['closeup'], header['cell']
+    assert figures['depth'] == 0.00062
+    assert figures['speed'] == pytest.approx(3000.0, rel=1e-6)
+    assert cell['flag']['up'] is True
+    assert 3.0 < cell['flag']['since'] < 4.1
+    peak = np.argmax(arrays['spectrum'][1:]) + 1
+    assert peak * figures['hertz'] == pytest.approx(cell['figures']['frequency'], rel=0.02)
+    before, _ = look(shown, do='at', time=2.0)
+    assert before['cell']['flag'] == {'up': False, 'since': None}
+    assert before['closeup']['depth'] == 0.0005
+
+
+def test_sessions_follow_each_other_and_what_is_missing_stays_open(tmp_path: Path) -> None:
+    config = recorded_config({})
+    with LatheRun(tmp_path / 'run', parameters_of(config.lathe())) as written:
+        for _ in range(2):  # the second begins at time zero again
+            lathe = config.lathe()
+            for k in range(20):
+                block = lathe.advance(500)
+                if k != 10:
+                    written.write(block)
+    shown = RecordedRun(tmp_path / 'run')
+    asyncio.run(shown.read())
+    _, arrays = look(shown, do='view', plot='overview', **{'from': 0.0, 'to': 2.0})
+    times = np.asarray(arrays['times'])
+    assert times[-1] == pytest.approx(2.0, abs=0.01)
+    steps = np.diff(times)
+    assert np.count_nonzero(steps > 0.04) == 2
+    _, arrays = look(shown, do='view', plot='part', **{'from': 1.2, 'to': 1.21})
+    first = read_run(tmp_path / 'run').samples()
+    restart = int(np.argmax(np.diff(first.columns['time']) < 0)) + 1
+    time, place = first.columns['time'][restart:], first.columns[SIGNALS[0]][restart:]
+    expected = place[(time >= 0.2 - 1e-9) & (time <= 0.21 + 1e-9)]
+    np.testing.assert_allclose(columns(arrays)[0][:, 0], expected, atol=1e-12)
+
+
+def test_what_is_no_run_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(RunReadError):
+        RecordedRun(tmp_path)
+
+
+@pytest.fixture(scope='module')
+def served(run: Path) -> Iterator[str]:
+    """The verb as a user starts it; it ends at Ctrl-C with nothing but what it said."""
+    command = [sys.executable, '-u', '-m', 'lathe_chatter.cli', 'page', str(run)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    found = re.search(r'http://\S+', line + process.stdout.readline() if line else '')
+    assert found, process.stderr.read() if process.stderr else ''
+    yield found[0]
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, errors) == (0, '')
+
+
+@pytest.mark.skipif(chromium() is None, reason='no Chromium is here')
+@pytest.mark.parametrize('width', [390, 1280])
+def test_a_browser_scrubs_through_the_run(served: str, tmp_path: Path, width: int) -> None:
+    browser = Browser(tmp_path / 'profile')
+    try:
+        browser.open(served, width)
+        browser.until('document.querySelectorAll("#log button").length >= 4', 'what happened')
+        browser.until('document.querySelector("#overview canvas")', 'the whole')
+        browser.run('document.querySelector("#at").focus()')
+        browser.key('Home', 36)
+        browser.until('parseFloat(document.querySelector("#clock").textContent) < 0.1', 'zero')
+        browser.until('document.querySelector("#lamp-word").textContent !== "CHATTER"', 'no lamp')
+        browser.run('look(4.1, 0.1)')
+        browser.until('document.querySelector("#lamp-word").textContent === "CHATTER"', 'the lamp')
+        browser.until('document.querySelector("#chart-text").textContent.includes("0.62")', 'it')
+        for plot in ('displacement-0', 'velocity-0', 'tool-portrait', 'spectrum', 'chart'):
+            browser.until(f'document.querySelector("#{plot} canvas")', plot)
+        begun = time.monotonic()
+        browser.click('#log button')  # the change of depth
+        browser.until('document.querySelector("#clock").textContent === "3.000 s"', 'that moment')
+        assert time.monotonic() - begun < PATIENCE
+        assert browser.run('document.documentElement.scrollWidth') <= width
+        assert browser.complaints == []
+    finally:
+        browser.close()
+
+
+def test_it_is_only_looked_at(served: str) -> None:
+    host = served.split('/')[2]
+    asked = http.client.HTTPConnection(host)
+    asked.request('GET', '/', headers={'Host': 'elsewhere.example'})
+    assert asked.getresponse().status == 403
