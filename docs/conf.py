@@ -43,8 +43,8 @@ python_use_unqualified_type_names = True
 sphinx_gallery_conf = {
     'examples_dirs': '../examples',
     'gallery_dirs': 'auto_examples',
-    'filename_pattern': r'/.*\.py$',
-    'ignore_pattern': r'(__init__|notebooks/).*',
+    'filename_pattern': r'/plot_',
+    'ignore_pattern': r'/(?!plot_)[^/]*\.py$',  # what needs a data set or a file first
     'abort_on_example_error': True,
     'remove_config_comments': True,
     'show_memory': False,
