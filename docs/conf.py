@@ -44,7 +44,7 @@ sphinx_gallery_conf = {
     'examples_dirs': '../examples',
     'gallery_dirs': 'auto_examples',
     'filename_pattern': r'/plot_',
-    'ignore_pattern': r'/(?!plot_)[^/]*\.py$',  # what needs a data set or a file first
+    'ignore_pattern': r'(^|/)(?!plot_)[^/]*\.py$',  # what needs a data set or a file first
     'abort_on_example_error': True,
     'remove_config_comments': True,
     'show_memory': False,
