@@ -37,12 +37,17 @@ def _derived_monitor(given: Values) -> Resolved:
     if slowest >= fastest:
         allowed = f'above slowest_speed, which is {slowest:g} rev/min'
         raise ParameterError('fastest_speed', fastest, 'rev/min', allowed)
-    return {**derived_machine(given), **spindle}
+    source = given.get('model', MONITOR['model'].default)
+    if source == ModelSource.AUTO.value:
+        own = {MACHINE_FILE.name, *(row.name for row in MACHINE_ROWS)} & given.keys()
+        source = ModelSource.PARAMETERS.value if own else ModelSource.LATHE.value
+    return {**derived_machine(given), **spindle, 'model': source}
 
 
 class ModelSource(str, Enum):
-    """Where the monitor gets the machine from: its own parameters, the lathe's, or nowhere."""
+    """Where the monitor gets the machine from."""
 
+    AUTO = 'auto'
     PARAMETERS = 'parameters'
     LATHE = 'lathe'
     NONE = 'none'
@@ -52,8 +57,9 @@ MONITOR = ParameterTable(
     (
         Row(
             'model',
-            ModelSource.PARAMETERS.value,
-            (ModelSource.__doc__ or '').rstrip('.'),
+            ModelSource.AUTO.value,
+            "where the machine comes from: the node's own parameters, the lathe's, or nowhere; "
+            'auto becomes parameters where any of them is given, else lathe, if one is there',
             choices=ModelSource,
         ),
         MACHINE_FILE,

@@ -69,6 +69,7 @@ class SupervisorNode(ParameterNode):
         self._sent: dict[str, Any] = {}
         self._cut: Cut | None = None
         self._machine: Machine | None = None
+        self._lathe_tells = False
         self._answer: tuple[Any, float] | None = None
         self._newest = 'nothing was done yet'
         self._set = self.create_client(SetParametersAtomically, 'lathe/set_parameters_atomically')
@@ -174,10 +175,11 @@ class SupervisorNode(ParameterNode):
                 self._take_cut()
             if name == self._monitor:
                 source = known.get('model')
-                if source == ModelSource.LATHE.value:
-                    self._remote.ask(self._lathe)
-                elif source == ModelSource.PARAMETERS.value:
+                self._lathe_tells = source == ModelSource.LATHE.value
+                if source == ModelSource.PARAMETERS.value:
                     self._machine = machine_from(known)
+            if self._lathe_tells and self._lathe_values:
+                self._machine = machine_from(self._lathe_values)
         except LatheChatterError as error:
             self.get_logger().error(f'{name} does not say what it is: {error}')
 

@@ -47,7 +47,7 @@ class Machine:
 
 @pytest.fixture
 def machine(start: Callable[..., Any], bench: Bench) -> Callable[[Cut], Machine]:
-    start(MonitorNode)
+    start(MonitorNode, model='parameters')
     return lambda cut: Machine(bench, cut)
 
 
@@ -155,7 +155,7 @@ def test_another_lathe_is_no_gap_although_its_time_is_later(
 
 
 def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> None:
-    start(MonitorNode)
+    start(MonitorNode, model='parameters')
     flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
     publisher = bench.talk(Float64MultiArray, '/lathe/samples')
     samples = VirtualLathe(cut=UNSTABLE).advance(20_000)
@@ -175,7 +175,7 @@ def test_columns_are_found_by_name(start: Callable[..., Any], bench: Bench) -> N
 
 
 def test_a_dead_sensor_is_done_without(start: Callable[..., Any], bench: Bench) -> None:
-    start(MonitorNode)
+    start(MonitorNode, model='parameters')
     flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
     publisher = bench.talk(Float64MultiArray, '/lathe/samples')
     samples = VirtualLathe(cut=UNSTABLE).advance(20_000)
@@ -252,6 +252,25 @@ def test_the_machine_is_asked_from_the_lathe(start: Callable[..., Any], bench: B
     assert monitor.machine.workpiece.mass == other
 
 
+@pytest.mark.parametrize(
+    ('given', 'source'),
+    [
+        ({}, 'lathe'),
+        ({'tool.mass': 0.06}, 'parameters'),
+        ({'machine': 'boring_bar'}, 'parameters'),
+        ({'tool.mass': 0.06, 'model': 'lathe'}, 'lathe'),
+        ({'model': 'none'}, 'none'),
+    ],
+)
+def test_the_machine_comes_from_where_it_is_known(
+    start: Callable[..., Any], given: dict[str, Any], source: str
+) -> None:
+    """By default from its own parameters where any is given, else from the lathe."""
+    monitor = start(MonitorNode, **given)
+    assert monitor.values['model'] == source
+    assert (monitor.machine is not None) == (source == 'parameters')
+
+
 def test_without_a_model_chatter_is_flagged_all_the_same(
     start: Callable[..., Any], bench: Bench
 ) -> None:
@@ -278,7 +297,7 @@ def test_without_a_model_chatter_is_flagged_all_the_same(
 
 def test_the_recorder_keeps_all_that_the_monitor_says(start: Callable[..., Any]) -> None:
     """Every topic of its own, as the graph knows them."""
-    node = start(MonitorNode)
+    node = start(MonitorNode, model='parameters')
     topics = node.get_publisher_names_and_types_by_node('chatter_monitor', node.get_namespace())
     own = {name.lstrip('/') for name, _types in topics if 'chatter_monitor/' in name}
     assert 'chatter_monitor/chatter' in own
@@ -288,7 +307,7 @@ def test_the_recorder_keeps_all_that_the_monitor_says(start: Callable[..., Any])
 @pytest.mark.parametrize(
     ('override', 'words'),
     [
-        ({'model': 'guess'}, 'one of parameters, lathe, none'),
+        ({'model': 'guess'}, 'one of auto, parameters, lathe, none'),
         ({'slowest_speed': 5e3, 'fastest_speed': 4e3}, 'slowest'),
     ],
 )

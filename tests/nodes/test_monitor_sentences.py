@@ -40,7 +40,7 @@ class Shop:
         self.log: list[Log] = bench.listen_first(Log, '/rosout', LATCHED)
 
     def monitor(self, **parameters: Any) -> MonitorNode:
-        node: MonitorNode = self.start(MonitorNode, **parameters)
+        node: MonitorNode = self.start(MonitorNode, **{'model': 'parameters', **parameters})
         self.flags = self.bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
         return node
 
@@ -245,7 +245,7 @@ def test_every_sentence_has_a_story_and_says_when_it_is_true() -> None:
 def test_a_space_after_the_comma_of_a_label_is_no_part_of_a_name(
     bench: Bench, start: Callable[..., Any]
 ) -> None:
-    node = start(MonitorNode)
+    node = start(MonitorNode, model='parameters')
     publisher = bench.talk(Float64MultiArray, '/lathe/samples')
     names = [f' {name}' for name in SAMPLE_COLUMNS]
     publisher.publish(encode_block(chatters(0.1), names))
