@@ -118,7 +118,8 @@ def _close_block(state: DetectorState) -> None:
     """Put the block that is full behind the others and renew the baseline."""
     blocks, now = state.blocks, state.now[0]
     for row in range(blocks.shape[0] - 1, 0, -1):
-        blocks[row] = blocks[row - 1]
+        for j in range(blocks.shape[1]):  # a whole row takes 4 s more to compile
+            blocks[row, j] = blocks[row - 1, j]
     blocks[0] = 0.0
     now.block_fill = 0
     now.blocks = min(now.blocks + 1, BLOCK_COUNT + LAG)

@@ -121,7 +121,8 @@ def take_hops(
         newest = (now.newest + 1) % HOPS
         now.newest = newest
         follow(samples, settings, kernels, memory, products[newest])
-        state.motion[newest] = memory.resonators
+        for j in range(memory.resonators.size):  # a whole row takes 4 s more to compile
+            state.motion[newest, j] = memory.resonators[j]
         speed = (samples[hop - 1, 0] - samples[0, 0]) / (hop - 1) * settings.rate
         if settings.has_angle != 0 and speed < settings.slowest_turns:
             # A spindle that stands cuts nothing; one hop of it may be a sensor that died.
