@@ -152,7 +152,7 @@ def compiled(  # noqa: PLR0913 -- one keyword for each fact about a function
 
 
 class _Flags(Flags):  # type: ignore[misc]  # Numba has no types
-    """Flags compared by what is set, where Numba compares all defaults too: a tenth of its time."""
+    """Flags compared by what is set: Numba compares all defaults too, a tenth of its time."""
 
     __slots__ = ()
 
