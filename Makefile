@@ -21,6 +21,7 @@ help:
 	@echo 'make test-kilted  what talks to ROS, on the wheels of ROS 2 Kilted instead of Jazzy'
 	@echo 'make everywhere   run and test as other users would: each Python, other folders and rights'
 	@echo 'make bounds       tests of the core on the lowest and newest versions that setup.py allows'
+	@echo 'make soak         every test ten times, three of them beside a busy core'
 	@echo 'make lock         write requirements/*.txt anew (make lock ARGS=--upgrade)'
 
 run:
@@ -57,6 +58,10 @@ everywhere:
 
 bounds:
 	@scripts/bounds $(ARGS)
+
+soak:
+	@python=$$(scripts/environment jazzy test) && "$$python" -m lathe_chatter.precompile \
+	  && "$$python" benchmarks/soak.py $(ARGS)
 
 lock:
 	@scripts/lock $(ARGS)
