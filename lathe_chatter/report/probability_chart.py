@@ -67,9 +67,11 @@ def draw_probability(axes: Axes, chart: StabilityProbability, depth_limit: float
         depth_limit: Top of the chart, m.
     """
     speeds, depths = chart.spindle_speed_rpm, np.linspace(0.0, depth_limit, _ROWS)
-    colours = axes.pcolormesh(
-        speeds, depths * _MILLI, chart.at(depths), cmap='Greens', vmin=0.0, vmax=1.6,
-        shading='gouraud', rasterized=True, zorder=0,
+    even = np.linspace(speeds[0], speeds[-1], speeds.size)
+    shades = np.array([np.interp(even, speeds, row) for row in chart.at(depths)])
+    colours = axes.imshow(  # an image is drawn in a tenth of the time of a mesh
+        shades, cmap='Greens', vmin=0.0, vmax=1.6, origin='lower', aspect='auto', zorder=0,
+        extent=(speeds[0], speeds[-1], 0.0, depth_limit * _MILLI), interpolation='bilinear',
     )  # fmt: skip
     bar = axes.figure.colorbar(
         colours, ax=axes, label='probability of being stable', pad=0.01,
