@@ -49,8 +49,9 @@ ARROWS = {
         'page',
     },
     'cli': {
-        *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'precompile'),
-        *('recording', 'scenario', 'dataset', 'report', 'paper', 'page', 'nodes', 'tap_test'),
+        *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'supervisor'),
+        *('precompile', 'recording', 'scenario', 'dataset', 'report', 'paper', 'page', 'nodes'),
+        'tap_test',
     },
 }
 """The packages from the bottom to the top, each with those below that it may use."""

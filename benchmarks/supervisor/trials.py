@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
+from support.machines import random_machine
 
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.stability import (
@@ -18,10 +17,6 @@ from lathe_chatter.stability import (
 )
 from lathe_chatter.supervisor import Limits
 from lathe_chatter.supervisor.moves import removal_rate
-
-sys.path.append(str(Path(__file__).parents[2] / 'tests'))
-
-from support.machines import random_machine
 
 SLOWEST, FASTEST = 1000.0, 12000.0
 _SCAN = 60.0 / np.linspace(60.0 / SLOWEST, 60.0 / FASTEST, 400)

@@ -25,6 +25,7 @@ from lathe_chatter.scenario import (
     find_scenario,
     load_scenario,
 )
+from lathe_chatter.supervisor import Mode
 
 NAME = 'run'
 HELP = 'start lathe, monitor and recorder, play a scenario, and leave the recorded run'
@@ -51,6 +52,11 @@ def configure(parser: ArgumentParser) -> None:
         help="open the operator's page in the browser and play nothing: whoever has it open "
         'operates, and may play scenarios, until Ctrl-C',
     )  # fmt: skip
+    parser.add_argument(
+        '--supervise',
+        choices=[mode.value for mode in Mode],
+        help='have a supervisor too, that watches, waits for ~/accept, or acts',
+    )
     add_json(parser)
 
 
@@ -62,6 +68,9 @@ def run(options: Namespace) -> int:
         load_machine(options.machine)
         parameters = {**scenario.parameters, MACHINE_FILE.name: options.machine}
         scenario = replace(scenario, parameters=parameters)
+    if options.supervise is not None:
+        supervisor = {**(scenario.supervisor or {}), 'mode': options.supervise}
+        scenario = replace(scenario, supervisor=supervisor)
     output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
     if utf8('--output', output).exists():
         raise RunFailedError(f'{output} exists already: give another --output.')

@@ -11,7 +11,7 @@ from lathe_chatter.cli.common_options import add_json, in_unit, scenario_help, u
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, ScenarioError
 from lathe_chatter.lathe.cut_events import Knock
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model.quantities import Quantity
@@ -103,6 +103,11 @@ def _scenario(options: Namespace) -> Scenario:
     if options.duration is not None:
         duration = _DURATION.check('--duration', options.duration)
         scenario = replace(scenario, duration=duration)
+    if scenario.supervisor is not None:
+        raise ScenarioError(
+            f'The scenario {scenario.name} has a supervisor, which takes real nodes: play it with '
+            '`lathe-chatter run`.'
+        )
     return replace(scenario, parameters={**scenario.parameters, **given_parameters(options)})
 
 

@@ -70,6 +70,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
             )
         self.create_subscription(Bool, 'chatter_monitor/chatter', self._on_flag, _LATCHED)
         self.create_subscription(String, 'chatter_monitor/state', self._on_state, _LATCHED)
+        self.create_subscription(String, 'chatter_supervisor/action', self._on_action, _LATCHED)
 
     @property
     def idle(self) -> bool:
@@ -87,6 +88,9 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
             step = self.player.due(self.time, self._estimates['recommended_speed_rpm'])
             if step is not None:
                 self._play(step)
+
+    def _on_action(self, message: String) -> None:
+        self._tell(f'{self.time:7.2f} s  supervisor: {message.data}')
 
     def _on_state(self, message: String) -> None:
         self.state = message.data

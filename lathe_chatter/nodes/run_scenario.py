@@ -20,7 +20,7 @@ from lathe_chatter.nodes.deferred_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
-from lathe_chatter.nodes.parameters import MONITOR
+from lathe_chatter.nodes.parameters import MONITOR, SUPERVISOR
 from lathe_chatter.page.server import answers, free_port, open_in_browser
 from lathe_chatter.scenario import Scenario
 
@@ -35,7 +35,9 @@ _DISCOVERY = 1.5
 """s in which nodes that are there already become known."""
 _SETTLING = 0.3
 """s in which the graph has heard that nodes have ended."""
-_OURS = {'lathe': 1, 'chatter_monitor': 1, 'run_recorder': 1, 'lathe_operator': 1}
+_OURS = dict.fromkeys(
+    ('lathe', 'chatter_monitor', 'run_recorder', 'chatter_supervisor', 'lathe_operator'), 1
+)
 """How many nodes of each name a run has."""
 _READERS = 3
 """Recorder, monitor and operator: the lathe cuts nothing before it has met them all."""
@@ -80,6 +82,10 @@ def play(
         if name not in LATHE:
             raise RunFailedError(f'The scenario {scenario.name}: {LATHE.unknown(name)}')
         LATHE[name].check(value)
+    for name in scenario.supervisor or {}:
+        if name not in SUPERVISOR:
+            raise RunFailedError(f'The scenario {scenario.name}: {SUPERVISOR.unknown(name)}')
+    SUPERVISOR.complete(_supervisor_of(scenario))
     if logs := ensure_log_folder():
         screen.say(logs)
     try:
@@ -103,6 +109,12 @@ def play(
                 rclpy.try_shutdown()
     except KeyboardInterrupt:  # while the nodes were ending: they have ended in order
         return True
+
+
+def _supervisor_of(scenario: Scenario) -> dict[str, Any]:
+    """The parameters of the supervisor of a scenario as its table takes them."""
+    given = scenario.supervisor or {}
+    return {name: SUPERVISOR[name].parsed(value) for name, value in given.items()}
 
 
 @contextmanager
@@ -152,6 +164,9 @@ def _play(  # noqa: PLR0913, PLR0917 -- what is played, where to, and how
                     # The machine alone: of the cut it knows what the samples tell.
                     parameter_arguments({name: given[name] for name in given if name in MONITOR}),
                 )
+                if operator.scenario.supervisor is not None:
+                    supervisor = _supervisor_of(operator.scenario)
+                    cell.start('chatter_supervisor', parameter_arguments(supervisor))
                 _await_nodes(operator, spin)
             cell.start(
                 'lathe',
@@ -204,6 +219,8 @@ def _await_nodes(operator: Operator, spin: Callable[[], None]) -> None:
     """Wait until the recorder and the monitor are there, so that nothing of the lathe is lost."""
     until = time.monotonic() + _START_PATIENCE
     wanted = {'run_recorder', 'chatter_monitor'}
+    if operator.scenario.supervisor is not None:
+        wanted.add('chatter_supervisor')
     while not wanted <= set(operator.get_node_names()):
         spin()
         _refuse_company(operator)

@@ -63,6 +63,7 @@ class Scenario:
         duration: Simulated time after which the run ends, s.
         parameters: Of the node `lathe` at its start.
         steps: The changes, in order.
+        supervisor: Parameters of a node `chatter_supervisor` that plays too; None without one.
         expect: What the monitor should have said at the end: `FLAGGED` and `CLEARED` to a truth.
     """
 
@@ -71,6 +72,7 @@ class Scenario:
     duration: float
     parameters: Mapping[str, Any] = field(default_factory=dict)
     steps: tuple[Step, ...] = ()
+    supervisor: Mapping[str, Any] | None = None
     expect: Mapping[str, bool] = field(default_factory=dict)
 
     @property
@@ -139,7 +141,7 @@ def load_scenario(path: Path) -> Scenario:
     if not isinstance(raw, dict):
         raise ScenarioError(f'The scenario {path} is empty or no mapping of keys to values.')
     where = f'The scenario {path}'
-    _only(raw, {'name', 'title', 'duration', 'parameters', 'steps', 'expect'}, where)
+    _only(raw, {'name', 'title', 'duration', 'parameters', 'steps', 'supervisor', 'expect'}, where)
     steps = raw.get('steps') or []
     if not isinstance(steps, list):
         raise ScenarioError(f'{where}: steps must be a list.')
@@ -158,6 +160,7 @@ def load_scenario(path: Path) -> Scenario:
         duration=duration,
         parameters=_parameters(raw, path, where),
         steps=tuple(_step(entry, f'{where}: step {k + 1}') for k, entry in enumerate(steps)),
+        supervisor=_mapping(raw, 'supervisor', where) if 'supervisor' in raw else None,
         expect=expect,
     )
     _check_times(scenario, where)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,15 @@ _SHORT_WAY = 0.05
 """Part of the removal rate that a speed e times as far away has to be worth."""
 _SURE_DECAY = -1.0
 """Growth rate below which a varied speed is believed to help, 1/s."""
+_ROUNDING = 1e-9
+_NEAREST = 4
+"""Intervals of stable speeds that are looked into, the nearest ones."""
+_SLOWEST_SWING = 0.2
+"""Frequency of a variation below which none is tried, Hz."""
+_MOST_HEARD = 2.0
+"""Times the told C w that may be heard."""
+_SURGE = 5.0
+"""Times that vibration may grow to while the varied speed passes where it grows."""
 _WAY = 24
 """Speeds on the way to another one that are looked at."""
 
@@ -110,21 +120,37 @@ def removal_rate(cut: Cut) -> float:
     return cut.depth_of_cut * cut.feed * cut.spindle_speed_rpm / 60.0
 
 
-def growth_of(machine: Machine, cut: Cut, contacts: tuple[bool, ...]) -> float:
-    """The greatest predicted growth rate in some contacts (seated or not), 1/s."""
+class Regime(NamedTuple):
+    """A machine and whether its workpiece is seated."""
+
+    machine: Machine
+    seated: bool
+
+
+def regimes_of(machine: Machine, cut: Cut) -> tuple[Regime, ...]:
+    """What a cut may be: floating, seated or, across a clearance, both and in between.
+
+    Where it is seated for a part of each cycle, a part of the bearing carries.
+    """
+    floating, seated = Regime(machine, seated=False), Regime(machine, seated=True)
+    if cut.bearing_contact is BearingContact.NONE:
+        return (floating,)
+    if cut.bearing_contact is BearingContact.SEATED:
+        return (seated,)
+    half = replace(machine, bearing_stiffness=0.5 * machine.bearing_stiffness)
+    return floating, Regime(half, seated=True), seated
+
+
+def growth_of(regimes: tuple[Regime, ...], cut: Cut) -> float:
+    """The greatest predicted growth rate in some regimes, 1/s."""
     if cut.speed_variation_amplitude:
-        return max(floquet(machine, cut, seated=s).growth_rate for s in contacts)
+        return max(floquet(each.machine, cut, seated=each.seated).growth_rate for each in regimes)
     at = cut.spindle_speed_rpm, cut.depth_of_cut
     process = ProcessDamping.of(cut)
-    roots = [rightmost_root(machine, *at, seated=s, process=process) for s in contacts]
-    return max(root.real for root in roots)
-
-
-def contacts_of(cut: Cut) -> tuple[bool, ...]:
-    """Whether the workpiece may float (False), be seated (True), or both in turn."""
-    if cut.bearing_contact is BearingContact.NONE:
-        return (False,)
-    return (True,) if cut.bearing_contact is BearingContact.SEATED else (False, True)
+    return max(
+        rightmost_root(each.machine, *at, seated=each.seated, process=process).real
+        for each in regimes
+    )
 
 
 def moves_for(machine: Machine, cut: Cut, limits: Limits, amplitude: float = 0.0) -> list[Move]:
@@ -141,10 +167,13 @@ def moves_for(machine: Machine, cut: Cut, limits: Limits, amplitude: float = 0.0
     """
     process = ProcessDamping.of(cut)
     found: list[Move] = []
-    both = contacts_of(cut)
-    for contacts in dict.fromkeys((both, *((each,) for each in both))):
+    if not cut.depth_of_cut > 0.0:
+        return found
+    every = regimes_of(machine, cut)
+    single = [(each,) for each in every if each.machine == machine and len(every) > 1]
+    for regimes in (every, *single):
         for reserve in _RESERVES:
-            search = _Search(machine, cut, limits, amplitude, process, contacts, reserve)
+            search = _Search(cut, limits, amplitude, process, regimes, reserve)
             found += search.constant_speeds()
             if not any(move.kept > 0.99 for move in found):
                 found += [*search.varied_speeds(), *search.smaller_feeds()]
@@ -156,28 +185,36 @@ def moves_for(machine: Machine, cut: Cut, limits: Limits, amplitude: float = 0.0
 
 @dataclass(frozen=True)
 class _Search:
-    """A cut for which another is looked for, that is stable in some contacts with a reserve."""
+    """A cut for which another is looked for, that is stable in some regimes with a reserve."""
 
-    machine: Machine
     cut: Cut
     limits: Limits
     amplitude: float
     process: ProcessDamping
-    contacts: tuple[bool, ...]
+    regimes: tuple[Regime, ...]
     reserve: float
 
     def constant_speeds(self) -> list[Move]:
         """Speeds at the present depth, or at less of it."""
         found: list[Move] = []
+        deepest = self.cut.depth_of_cut
         for part in _DEPTHS:
-            depth = part * self.cut.depth_of_cut
+            depth = part * deepest
             if depth < self.limits.smallest_depth and part < 1.0:
                 break
-            for low, high in self._intervals((1.0 + self.reserve) * depth):
-                rpm, edge = self._inside(low, high)
-                if edge >= _LEAST_EDGE:
-                    changes = {'spindle_speed_rpm': rpm, 'depth_of_cut': depth}
-                    found += self._move(changes, min(edge / _EDGE, 1.0))
+            speeds = [
+                self._inside(*each)
+                for each in self._intervals((1.0 + self.reserve) * depth).tolist()
+            ]
+            away = {rpm: abs(math.log(rpm / self.cut.spindle_speed_rpm)) for rpm, _ in speeds}
+            for rpm, edge in sorted(speeds, key=lambda speed: away[speed[0]])[:_NEAREST]:
+                if edge < _LEAST_EDGE:
+                    continue
+                if part < 1.0:  # between two of the depths
+                    depth = self._critical_depth(rpm) / (1.001 + self.reserve)
+                    depth = min(max(depth, part * deepest), deepest)
+                changes = {'spindle_speed_rpm': rpm, 'depth_of_cut': depth}
+                found += self._move(changes, min(edge / _EDGE, 1.0))
             if any(move.kept >= part - 0.05 for move in found):
                 break
         return found
@@ -190,31 +227,32 @@ class _Search:
             low, high = rpm * (1.0 - amplitude), rpm * (1.0 + amplitude)
             if self.limits.slowest_speed <= low and high <= self.limits.fastest_speed:
                 frequency = self.limits.ramp / (2.0 * math.pi * amplitude * rpm)
-                yield from self._move(
-                    {
-                        'speed_variation_amplitude': amplitude,
-                        'speed_variation_frequency': min(frequency, 0.1 * highest),
-                    },
-                    0.9,
-                )
+                if frequency < _SLOWEST_SWING:
+                    continue
+                changes = {
+                    'speed_variation_amplitude': amplitude,
+                    'speed_variation_frequency': min(frequency, 0.1 * highest),
+                }
+                yield from self._move(changes, 0.9)
 
     def smaller_feeds(self) -> Iterator[Move]:
         """The largest feed at which the mean force leaves the workpiece floating."""
         cut = self.cut
-        if self.contacts != (False,) or cut.bearing_contact is BearingContact.NONE:
+        machine, seated = self.regimes[0]
+        if seated or not self._is_one_of_several():
             return
-        seats = seating_depth(self.machine, cut.bearing_clearance, cut.feed)
+        seats = seating_depth(machine, cut.bearing_clearance, cut.feed)
         part = seats / cut.depth_of_cut / (1.0 + 2.0 * self.reserve)
         if part < 1.0 and part * cut.feed >= self.limits.smallest_feed:
             name = 'feed_per_revolution' if cut.feed_per_revolution else 'feed_speed'
             yield from self._move({name: part * getattr(cut, name)}, 0.8)
 
     def _intervals(self, depth: float) -> Array:
-        """The speeds at which a depth is stable in all contacts (n, 2), rev/min."""
+        """The speeds at which a depth is stable in all regimes (n, 2), rev/min."""
         common = np.array([[self.limits.slowest_speed, self.limits.fastest_speed]])
-        for seated in self.contacts:
+        for machine, seated in self.regimes:
             found = stable_speed_intervals(
-                self.machine, depth, seated=seated, process=self.process,
+                machine, depth, seated=seated, process=self.process,
                 low_rpm=self.limits.slowest_speed, high_rpm=self.limits.fastest_speed,
             )  # fmt: skip
             low = np.maximum(common[:, None, 0], found[None, :, 0]).ravel()
@@ -225,64 +263,82 @@ class _Search:
     def _inside(self, low: float, high: float) -> tuple[float, float]:
         """The speed of an interval that is nearest to the present one, and its relative edge."""
         ends = (low, high)
-        if low > self.limits.slowest_speed:
+        if low > self.limits.slowest_speed * (1.0 + _ROUNDING):
             ends = (low * (1.0 + _EDGE), high)
-        if high < self.limits.fastest_speed:
+        if high < self.limits.fastest_speed * (1.0 - _ROUNDING):
             ends = (ends[0], high * (1.0 - _EDGE))
         if ends[0] >= ends[1]:
             return 0.5 * (low + high), (high - low) / (high + low)
-        # As a machinist would set it.
-        return float(round(min(max(self.cut.spindle_speed_rpm, ends[0]), ends[1]))), _EDGE
+        present = self.cut.spindle_speed_rpm
+        # A whole number, as a machinist would set it.
+        near = min(max(present, ends[0]), ends[1])
+        return near if near == present else float(round(near)), _EDGE
 
     def _move(self, changes: dict[str, float], sureness: float) -> Iterator[Move]:
         """A move to a changed cut, if it is stable there, and on the way."""
         new = self.cut.with_changes(**changes)
         deeper = new.with_changes(depth_of_cut=(1.0 + self.reserve) * new.depth_of_cut)
         varied = new.speed_variation_amplitude > 0.0
-        if len(self.contacts) < len(contacts_of(new)) and any(
-            contact_at(self.machine, each).seated not in self.contacts for each in (new, deeper)
+        machine, seated = self.regimes[0]
+        if self._is_one_of_several() and any(
+            contact_at(machine, each).seated is not seated for each in (new, deeper)
         ):
             return
-        if growth_of(self.machine, deeper, self.contacts) > (_SURE_DECAY if varied else 0.0):
+        if growth_of(self.regimes, deeper) > (_SURE_DECAY if varied else 0.0):
             return
-        if self.amplitude * self._rise(new) > self.limits.amplitude_limit:
+        rise = self._rise(new)
+        if self.amplitude * rise > self.limits.amplitude_limit or (varied and rise > _SURGE):
             return
         margin = math.nan
         if not varied:
-            critical = [
-                critical_depth(
-                    self.machine, new.spindle_speed_rpm, seated=each, process=self.process
-                )
-                for each in self.contacts
-            ]
-            margin = min(critical) / new.depth_of_cut - 1.0
-        kept = min(removal_rate(new) / removal_rate(self.cut), 1.0)
+            margin = self._critical_depth(new.spindle_speed_rpm) / new.depth_of_cut - 1.0
+        before = removal_rate(self.cut)
+        kept = min(removal_rate(new) / before, 1.0) if before else 1.0
         away = abs(math.log(new.spindle_speed_rpm / self.cut.spindle_speed_rpm))
         worth = kept * (0.5 + 0.5 * sureness) - _SHORT_WAY * away
-        yield Move(new, growth_of(self.machine, new, self.contacts), margin, kept, worth)
+        yield Move(new, growth_of(self.regimes, new), margin, kept, worth)
+
+    def _is_one_of_several(self) -> bool:
+        """Whether the regime is only that of the mean force, and holds while this does."""
+        return len(self.regimes) < len(regimes_of(self.regimes[0].machine, self.cut))
+
+    def _critical_depth(self, rpm: float) -> float:
+        """The smallest of the regimes, m."""
+        return min(
+            critical_depth(machine, rpm, seated=seated, process=self.process)
+            for machine, seated in self.regimes
+        )
 
     def _rise(self, new: Cut) -> float:
         """How many times its amplitude the vibration may grow to while the speed changes."""
         rpm = self.cut.spindle_speed_rpm, new.spindle_speed_rpm
+        lasting = abs(rpm[1] - rpm[0]) / self.limits.ramp / _WAY
         on_the_way = np.linspace(*rpm, _WAY)
+        if swing := new.speed_variation_amplitude:  # and while it varies
+            lasting = 1.0 / new.speed_variation_frequency / _WAY
+            turn = np.linspace(0.0, 4.0 * np.pi, 2 * _WAY)
+            on_the_way = rpm[1] * (1.0 + swing * np.sin(turn))
         rates = [
             rightmost_roots(
-                self.machine, on_the_way, new.depth_of_cut, seated=each, process=self.process,
+                machine, on_the_way, new.depth_of_cut, seated=seated, process=self.process,
                 proven=False,
             ).real
-            for each in self.contacts
+            for machine, seated in self.regimes
         ]  # fmt: skip
-        lasting = abs(rpm[1] - rpm[0]) / self.limits.ramp / _WAY
-        growth = np.maximum(np.max(rates, axis=0), 0.0).sum() * lasting
-        return math.exp(min(float(growth), 50.0))
+        grown = highest = 0.0
+        for rate in np.max(rates, axis=0) * lasting:
+            grown = max(grown + rate, 0.0)
+            highest = max(highest, grown)
+        return math.exp(min(highest, 50.0))
 
 
 def heard(machine: Machine, cut: Cut, cutting_stiffness: float) -> Machine:
     """The machine with the C that is heard, where it is greater than what was told.
 
-    Chatter that leaves the cut makes C w look less than it is, never more.
+    Chatter that leaves the cut makes C w look less than it is. Much more than was told is an
+    error: a cut begun a moment ago, or not this one.
     """
     told = machine.cutting_stiffness(cut.depth_of_cut)
-    if not cutting_stiffness > told > 0.0:
+    if not 0.0 < told < cutting_stiffness < _MOST_HEARD * told:
         return machine
     return replace(machine, cutting_coefficient=cutting_stiffness / cut.depth_of_cut)

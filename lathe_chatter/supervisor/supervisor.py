@@ -11,8 +11,12 @@ from enum import Enum
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.supervisor.moves import Limits, Move, heard, moves_for
 
-_SETTLING = 0.5
+_SETTLING, _LONGEST = 0.5, 2.0
 """s from a move to the judgement whether the vibration falls, and from that to the next."""
+_AGAIN = 1.0
+"""s after which it looks for a move again, where it could not make one."""
+_EFOLDS = 1.5
+"""Of the predicted decay, before that judgement."""
 _FALLING = 0.9
 """Part to which the vibration must have fallen meanwhile, where chatter is said to die."""
 _FALLEN = 0.5
@@ -74,11 +78,13 @@ class Action:
         sentence: For people; empty for a step of a ramp.
         changes: Parameters of the lathe to set together.
         stop: Whether the lathe is to be paused.
+        settling: s after which it can be judged.
     """
 
     sentence: str = ''
     changes: Mapping[str, float] = field(default_factory=dict)
     stop: bool = False
+    settling: float = _SETTLING
 
 
 @dataclass(frozen=True)
@@ -132,7 +138,7 @@ class Supervisor:
         self._offer: tuple[Cut, Action, float] | None = None
         self._ramp: _Ramp | None = None
         self._next_step = self._judge_at = -math.inf
-        self._at_move = math.nan
+        self._at_move, self._settling = math.nan, _SETTLING
         self._refusal = self._said = ''
 
     def hand_moved(self, time: float) -> Action | None:
@@ -200,11 +206,13 @@ class Supervisor:
         doubt = _DOUBT**self.moves
         machine = replace(machine, cutting_coefficient=doubt * machine.cutting_coefficient)
         amplitude = seen.amplitude if math.isfinite(seen.amplitude) else 0.0
+        self._judge_at = seen.time + _AGAIN
         for move in moves_for(machine, seen.cut, self.limits, amplitude):
             if not any(_same(move.cut, cut) for cut in self._tried):
                 changes = move.changes_from(seen.cut)
                 said = f'{why}: {{}} set {_changes(changes, seen.cut)} ({_expected(move)})'
-                return self._decide(seen, Action(said, changes), move.cut)
+                settling = min(_SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
+                return self._decide(seen, Action(said, changes, settling=settling), move.cut)
         nothing = 'no cut within the limits is predicted to be stable, and none was left to try'
         return self._once(f'{why}: {nothing}; a person has to decide.')
 
@@ -230,7 +238,8 @@ class Supervisor:
         changes = dict(action.changes)
         target = changes.get('spindle_speed_rpm')
         self._at_move = seen.amplitude
-        self._judge_at = math.inf if action.stop else seen.time + _SETTLING
+        self._settling = math.inf if action.stop else action.settling
+        self._judge_at = seen.time + self._settling
         if target is None:
             return action
         start, own = seen.cut.spindle_speed_rpm, seen.spindle_acceleration
@@ -254,7 +263,7 @@ class Supervisor:
         rpm = ramp.start + math.copysign(min(gone, abs(left)), left)
         if gone >= abs(left):
             self._ramp, rpm = None, ramp.target
-            self._judge_at = seen.time + _SETTLING
+            self._judge_at = seen.time + self._settling
         return Action(changes={'spindle_speed_rpm': rpm})
 
     def _hindrance(self, seen: Seen) -> str:
@@ -265,6 +274,8 @@ class Supervisor:
             return 'the machine is not known, or does not fit what is heard'
         if seen.time < self._hand_at + self._hands_off:
             return 'somebody else has just changed something'
+        if seen.chatter and not math.isfinite(seen.amplitude):
+            return 'the amplitude is not known'
         return ''
 
     # -- no chatter --------------------------------------------------------------------------
