@@ -21,6 +21,7 @@ from lathe_chatter.scenario import Scenario, Step
 from lathe_chatter.scenario.player import ScenarioPlayer
 
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 
@@ -70,7 +71,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
             )
         self.create_subscription(Bool, 'chatter_monitor/chatter', self._on_flag, _LATCHED)
         self.create_subscription(String, 'chatter_monitor/state', self._on_state, _LATCHED)
-        self.create_subscription(String, 'chatter_supervisor/action', self._on_action, _LATCHED)
+        self.create_subscription(String, 'chatter_supervisor/action', self._on_action, _SENTENCES)
 
     @property
     def idle(self) -> bool:
@@ -90,7 +91,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
                 self._play(step)
 
     def _on_action(self, message: String) -> None:
-        self._tell(f'{self.time:7.2f} s  supervisor: {message.data}')
+        self._log(f'{self.time:7.2f} s  supervisor: {message.data}')
 
     def _on_state(self, message: String) -> None:
         self.state = message.data

@@ -38,6 +38,8 @@ _NO_ANSWER = 2.0
 """s in which the lathe has to answer."""
 _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'margin')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Two may come at once; who comes late has the newest."""
 _BELIEVED = {Works.FULL.value, Works.CORRECTED.value}
 _LATHE, _MONITOR = 'lathe', 'chatter_monitor'
 
@@ -89,7 +91,7 @@ class SupervisorNode(ParameterNode):
         self.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
         topic = '~/action'
         self._action = self.create_publisher(
-            String, topic, _LATCHED, qos_overriding_options=publisher_overrides(self, topic)
+            String, topic, _SENTENCES, qos_overriding_options=publisher_overrides(self, topic)
         )
         self._diagnostics = Diagnostics(self, 'chatter supervisor')
         self.create_service(Trigger, '~/accept', self._on_accept)

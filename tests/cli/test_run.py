@@ -20,6 +20,7 @@ pytest.importorskip('domain_coordinator', reason='domain_coordinator is not ther
 from domain_coordinator import domain_id
 
 from lathe_chatter.cli.main import main
+from lathe_chatter.recording import read_run
 
 PACE = 2.0
 """Simulated seconds a second: the test need not take as long as the cut."""
@@ -99,6 +100,19 @@ def test_the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it(
     assert float(told[1]) == pytest.approx(flagged['frequency'], abs=5.0)
     assert max(root['growth_rate'] for root in cured['roots'].values()) < 0
     assert Path(figures['picture']).stat().st_size > 20_000
+
+
+def test_a_supervisor_cures_it_without_anybody(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    figures = play(at_pace('supervised', tmp_path), tmp_path / 'run', environment)
+    assert 'supervisor: Chatter at' in figures['said']
+    assert 'supervisor: The chatter has ended' in figures['said']
+    end = figures['occurrences'][-1]
+    assert max(root['growth_rate'] for root in end['roots'].values()) < 0
+    run = read_run(tmp_path / 'run')
+    sentences = [each.message.data for each in run.messages('/chatter_supervisor/action')]
+    assert any('I set' in sentence for sentence in sentences)
 
 
 def test_without_clearance_nothing_is_flagged(tmp_path: Path, environment: dict[str, str]) -> None:

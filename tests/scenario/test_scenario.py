@@ -23,7 +23,7 @@ def _write(folder: Path, text: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize('name', ['clearance', 'no_clearance'])
+@pytest.mark.parametrize('name', ['clearance', 'no_clearance', 'supervised'])
 def test_shipped_scenarios_can_be_played(name: str) -> None:
     scenario = load_scenario(find_scenario(name))
     assert scenario.name == name
@@ -40,7 +40,7 @@ def test_shipped_scenarios_can_be_played(name: str) -> None:
 
 
 def test_shipped_scenarios_are_found_by_name() -> None:
-    assert {'clearance', 'no_clearance'} <= set(shipped_scenarios())
+    assert {'clearance', 'no_clearance', 'supervised'} <= set(shipped_scenarios())
 
 
 def test_a_scenario_is_read_as_it_is_written(tmp_path: Path) -> None:

@@ -1,0 +1,174 @@
+"""A supervisor of the core on a real lathe and a real detector, in simulated time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.supervised_lathe import SupervisedLathe, faults_of
+
+from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.stability import rightmost_root
+from lathe_chatter.supervisor import Limits, Mode, Seen, Supervisor
+
+CALM = Cut(depth_of_cut=3e-4, bearing_contact=BearingContact.NONE, sensor_noise=1e-7)
+DEEP = 1e-3
+
+
+def chattering(
+    mode: Mode = Mode.ACT, limits: Limits | None = None, *, rpm: float = 3000.0, **options: Any
+) -> SupervisedLathe:
+    """A cut that is just flagged; nobody's hand has made it deeper."""
+    calm = CALM.with_changes(spindle_speed_rpm=rpm)
+    there = SupervisedLathe(calm, limits=limits, mode=mode, **options)
+    there.run(0.5)
+    there.set_by_hand(told=False, depth_of_cut=DEEP)
+    there.run(3.0, lambda: there.known.chatter)
+    assert there.known.chatter
+    return there
+
+
+def test_chatter_is_ended_by_one_move_to_a_stable_speed() -> None:
+    there = chattering()
+    there.run(2.5)
+    assert not there.known.chatter
+    assert len(there.moves) == 1
+    cut = there.lathe.cut
+    assert cut.depth_of_cut == DEEP
+    at = cut.spindle_speed_rpm, cut.depth_of_cut
+    assert rightmost_root(Machine(), *at, seated=False).real < 0.0
+    first, last = there.said
+    for words in ('growing at', 'I set spindle_speed_rpm from 3000 to', 'predicted: growth -'):
+        assert words in first
+    assert 'The chatter has ended' in last
+    assert not faults_of(there, CALM.with_changes(depth_of_cut=DEEP))
+
+
+def test_the_ramp_is_kept() -> None:
+    there = chattering(limits=Limits(ramp=1000.0))
+    there.run(2.5)
+    began = there.changed[1][0]
+    for time, cut in there.changed[1:]:
+        gone = abs(cut.spindle_speed_rpm - 3000.0)
+        assert gone <= 1000.0 * (time - began + 0.05)
+    assert abs(there.lathe.cut.spindle_speed_rpm - 3000.0) > 300.0
+
+
+def test_a_spindle_that_ramps_by_itself_is_told_once() -> None:
+    there = chattering(disturb=lambda _there, seen: replace(seen, spindle_acceleration=4000.0))
+    there.run(1.0)
+    assert len(there.changed) == 2
+
+
+@pytest.mark.parametrize('accepted', [False, True])
+def test_in_ask_it_waits(accepted: bool) -> None:
+    assert SupervisedLathe(CALM, mode=Mode.ASK).accept() == (
+        False,
+        'Nothing is waiting to be accepted.',
+    )
+    there = chattering(Mode.ASK)
+    there.run(0.3)
+    assert '~/accept does it' in there.said[-1]
+    assert len(there.changed) == 1
+    if accepted:
+        done, message = there.accept()
+        assert done
+        assert 'as was accepted' in message
+    there.run(1.5)
+    assert (len(there.changed) > 1) is accepted
+    assert there.known.chatter is not accepted
+
+
+def test_an_offer_lapses_when_somebody_changes_the_cut() -> None:
+    there = chattering(Mode.ASK)
+    there.run(0.3)
+    there.set_by_hand(spindle_speed_rpm=3010.0)
+    there.run(0.1)
+    done, message = there.accept()
+    assert not done
+    assert message
+
+
+def test_in_shadow_it_says_once_what_it_would_do() -> None:
+    there = chattering(Mode.SHADOW)
+    there.run(1.5)
+    assert len(there.changed) == 1
+    (sentence,) = there.said
+    assert 'I would set' in sentence
+    assert not there.accept()[0]
+
+
+def test_vibration_beyond_its_limit_that_does_not_fall_stops_the_lathe() -> None:
+    limits = Limits(2990.0, 3010.0, smallest_depth=DEEP, largest_variation=0.0,
+                    amplitude_limit=5e-6)  # fmt: skip
+    there = chattering(limits=limits)
+    there.run(3.0)
+    assert there.stopped
+    assert 'beyond amplitude_limit' in there.said[-1]
+
+
+def test_a_varied_speed_ends_chatter_where_no_constant_one_does() -> None:
+    limits = Limits(1580.0, 2420.0, ramp=40e3, smallest_depth=DEEP)
+    there = chattering(limits=limits, rpm=2000.0)
+    there.run(2.5)
+    assert there.lathe.cut.speed_variation_amplitude > 0.0
+    assert np.mean(there.vibration[-50:]) < 0.3 * max(there.vibration)
+
+
+def test_where_nothing_helps_a_person_has_to_decide() -> None:
+    limits = Limits(2990.0, 3010.0, smallest_depth=DEEP, largest_variation=0.0,
+                    amplitude_limit=0.1)  # fmt: skip
+    there = chattering(limits=limits)
+    there.run(1.0)
+    assert not there.moves
+    assert there.said == [there.said[0]]
+    assert 'a person has to decide' in there.said[0]
+
+
+def test_hands_off_while_somebody_else_acts() -> None:
+    there = SupervisedLathe(CALM)
+    there.run(0.5)
+    there.set_by_hand(depth_of_cut=DEEP)
+    there.run(1.9)
+    assert there.known.chatter
+    assert not there.moves
+    assert 'somebody else has just changed something' in there.said[-1]
+    there.run(1.5)
+    assert len(there.moves) == 1
+
+
+def looks(supervisor: Supervisor, **values: float | bool) -> list[str]:
+    """The sentences of three seconds in which the same is seen."""
+    supervisor.machine = Machine()
+    seen = [Seen(0.02 * k, CALM, **values) for k in range(150)]  # type: ignore[arg-type]
+    return [action.sentence for each in seen if (action := supervisor.look(each)) is not None]
+
+
+def test_a_small_margin_is_warned_of_once() -> None:
+    (sentence,) = looks(Supervisor(Limits(), Mode.ACT), margin=0.05)
+    assert sentence == 'The depth may grow by 5 % only, less than margin_limit, 10 %.'
+    assert not looks(Supervisor(Limits(), Mode.ACT), margin=0.2)
+
+
+def test_it_moves_early_only_if_so_told() -> None:
+    machine = Machine()
+    cut = CALM.with_changes(depth_of_cut=6.4e-4)
+    supervisor = Supervisor(Limits(), Mode.ACT, move_early=True)
+    supervisor.machine = machine
+    for k in range(100):
+        action = supervisor.look(Seen(0.02 * k, cut, margin=0.04, amplitude=1e-7))
+        if action is not None:
+            break
+    assert action is not None
+    assert action.changes
+    assert action.sentence.startswith('The depth may grow by 4 % only')
+
+
+def test_a_refusal_is_said_and_ends_the_attempts() -> None:
+    there = chattering()
+    there.refuse = lambda _action: 'spindle_speed_rpm may not be set.'
+    there.run(2.0)
+    assert len(there.changed) == 1
+    assert any('refused: spindle_speed_rpm may not be set' in sentence for sentence in there.said)
