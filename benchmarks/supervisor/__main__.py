@@ -16,6 +16,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
 import multiprocessing
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -25,12 +26,14 @@ from typing import Any
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parents[2] / 'tests'))
+sys.path.append(str(Path(__file__).resolve().parents[2] / 'tests'))
 
 from core import Outcome, play
+from stable import STRETCH, stretch
 from trials import random_trial
 
-FIRST_SEED = 1000
+FIRST_SEED, NODE_TRIALS = 1000, 10
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def _outcome(seed: int, off: float, answer: str) -> Outcome:
@@ -69,7 +72,50 @@ def _row(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-PARTS: dict[str, Callable[[Any], Iterator[str]]] = {'core': core}
+def stable(options: Any) -> Iterator[str]:
+    """Hours of stable cutting."""
+    count = max(round(3600.0 * options.hours / STRETCH), 1)
+    seeds = range(options.first_seed, options.first_seed + count)
+    with multiprocessing.Pool(options.processes) as pool:
+        found = pool.map(stretch, seeds, chunksize=5)
+    actions, alarms = sum(each[0] for each in found), sum(each[1] for each in found)
+    hours = count * STRETCH / 3600.0
+    yield f'{hours:.1f} h of stable cutting: {actions} actions, {alarms} alarms of the monitor'
+    yield from (f'   {sentence}' for acted, _, said in found if acted for sentence in said)
+
+
+def nodes(options: Any) -> Iterator[str]:
+    """The real nodes on the first machines of the table."""
+    from nodes import play_nodes  # where there is no ROS 2 the other parts work all the same
+
+    count = min(options.trials, NODE_TRIALS)
+    trials = [random_trial(options.first_seed + k) for k in range(count)]
+    played = [play_nodes(trial) for trial in trials]
+    flagged = [each for each in played if each.alarmed]
+    ended = [each for each in flagged if each.ended]
+    times = np.array([each.time for each in ended] or [np.nan])
+    yield (
+        f'real nodes: chatter ended in {len(ended)} of {len(flagged)} ({count} tried); from the '
+        f'flag to its end {np.median(times):.1f} s in the median, {times.max():.1f} s at most'
+    )
+    yield from (f'   {s}' for each in flagged if not each.ended for s in each.said)
+
+
+def hostile(_options: Any) -> Iterator[str]:
+    """The kinds of disturbance are tests: what they say is printed."""
+    command = [sys.executable, '-m', 'pytest', '-q', 'tests/supervisor/test_hostile.py']
+    done = subprocess.run(  # noqa: S603 -- our own tests
+        command, cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    yield f'hostile: {done.stdout.strip().splitlines()[-1]}'
+
+
+PARTS: dict[str, Callable[[Any], Iterator[str]]] = {
+    'core': core,
+    'stable': stable,
+    'nodes': nodes,
+    'hostile': hostile,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -32,12 +32,14 @@ class Trial:
         told: What an impact test says.
         cut: That chatters.
         seed: Of the noise.
+        limit: The smallest depth that is not stable, m.
     """
 
     machine: Machine
     told: Machine
     cut: Cut
     seed: int
+    limit: float
 
     @property
     def limits(self) -> Limits:
@@ -107,9 +109,10 @@ def random_trial(seed: int, off: float = 0.0) -> Trial:
         cut = replace(
             cut, feed_speed=cut.feed_per_revolution * rpm / 60.0, feed_per_revolution=0.0
         )
-    depth = _limit(machine, cut) * float(rng.uniform(1.1, 1.8))
+    limit = _limit(machine, cut)
+    depth = limit * float(rng.uniform(1.1, 1.8))
     cut = cut.with_changes(depth_of_cut=min(depth, 0.01))
-    return Trial(machine, _told(machine, rng, off), cut, seed)
+    return Trial(machine, _told(machine, rng, off), cut, seed, limit)
 
 
 def _limit(machine: Machine, cut: Cut) -> float:

@@ -311,6 +311,7 @@ class ChatterDetector:
             self._framer.faults(),
             words,
             *(self._margin if mode.knows_machine and not now['alarmed'] else (math.nan, math.nan)),
+            self._correction[0] if self._correction is not None else math.nan,
         )
 
 

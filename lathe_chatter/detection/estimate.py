@@ -81,6 +81,8 @@ class Estimate:
         margin: By what fraction the depth of cut may still grow, negative beyond the limit; known
             while there is no alarm.
         margin_error: Its standard error.
+        tool_frequency: That has taken the place of the tool's told natural frequency, Hz; nan
+            where none has.
         faults: What is wrong with sensors that should be there, each in some words.
     """
 
@@ -103,6 +105,7 @@ class Estimate:
     machine_fit: str = ''
     margin: float = math.nan
     margin_error: float = math.nan
+    tool_frequency: float = math.nan
 
     @property
     def doubling_time(self) -> float:

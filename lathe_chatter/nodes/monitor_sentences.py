@@ -24,6 +24,8 @@ class Sentence(NamedTuple):
     true_when: str
 
 
+TOOL_FREQUENCY = 'natural frequency of the tool as heard, Hz'
+"""In the diagnostics, where it has taken the place of the told one."""
 _AT = r'At \d+\.\d{6} s: '
 SENTENCES = {
     'listening': Sentence(
@@ -113,6 +115,7 @@ def details(estimate: Estimate) -> dict[str, object]:
         'waves per revolution': estimate.waves_per_revolution,
         'C w, N/m': estimate.cutting_stiffness,
         'stiffness under the workpiece, N/m': estimate.workpiece_stiffness,
+        TOOL_FREQUENCY: estimate.tool_frequency,
         'once-per-turn variance over all': estimate.once_per_turn,
     }
     details: dict[str, object] = {k: v for k, v in numbers.items() if math.isfinite(v)}

@@ -22,12 +22,14 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.model.parameters import cut_from, machine_from
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
+from lathe_chatter.supervisor.moves import with_tool_at
 
 _LOOK_PERIOD = 0.02
 _SILENCE = 1.0
@@ -62,16 +64,16 @@ class SupervisorNode(ParameterNode):
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
         moves_for(Machine(), Cut(), Limits())  # compiled or loaded before there is any hurry
         self._core = self._new_core()
-        self._figures = dict.fromkeys(_FIGURES, math.nan)
-        self._cutting_stiffness = math.nan
+        self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
+        self._cutting_stiffness = self._tool_frequency = math.nan
         self._chatter, self._state, self._works = False, '', ''
         self._heard_at = self._lost_at = -math.inf
-        self._lost = -1
+        self._lost = self._restarts = -1
         self._lathe_values: dict[str, Any] = {}
+        self._monitor_values: dict[str, Any] = {}
         self._sent: dict[str, Any] = {}
         self._cut: Cut | None = None
         self._machine: Machine | None = None
-        self._lathe_tells = False
         self._answer: tuple[Any, float] | None = None
         self._newest = 'nothing was done yet'
         self._set = self.create_client(SetParametersAtomically, 'lathe/set_parameters_atomically')
@@ -125,15 +127,15 @@ class SupervisorNode(ParameterNode):
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Begin anew with what was set."""
         self._core = self._new_core()
-        self._core.machine = self._machine if self._works in _BELIEVED else None
+        self._core.machine = self._believed()
         self._say(f'From now on: {", ".join(f"{n} = {v}" for n, v in changed.items())}.')
 
     # -- listening -----------------------------------------------------------------------------
 
     def _taker(self, name: str) -> Callable[[Float64], None]:
         def take(message: Float64) -> None:
-            self._figures[name] = message.data
             self._heard_at = time.monotonic()
+            self._figures[name] = message.data, self._heard_at
 
         return take
 
@@ -149,12 +151,17 @@ class SupervisorNode(ParameterNode):
             if status.name == f'{self._monitor}: cut':
                 self._works = values.get('works with', '')
                 self._cutting_stiffness = float(values.get('C w, N/m', math.nan))
-                self._core.machine = self._machine if self._works in _BELIEVED else None
+                self._tool_frequency = float(values.get(TOOL_FREQUENCY, math.nan))
+                self._core.machine = self._believed()
             elif status.name == f'{self._monitor}: samples' and 'samples lost' in values:
                 lost = int(values['samples lost'])
                 if lost > self._lost >= 0:
                     self._lost_at = time.monotonic()
-                self._lost = lost
+                restarts = int(values.get('restarts of the lathe', 0))
+                if restarts > self._restarts >= 0:  # it may be another machine, and another cut
+                    self._cut, self._lathe_values = None, {}
+                    self._remote.want_again(self._lathe)
+                self._lost, self._restarts = lost, restarts
 
     def _on_event(self, event: ParameterEvent) -> None:
         """Follow the lathe; what this node has not set somebody else has."""
@@ -175,13 +182,14 @@ class SupervisorNode(ParameterNode):
             if name == self._lathe:
                 self._lathe_values = known
                 self._take_cut()
-            if name == self._monitor:
-                source = known.get('model')
-                self._lathe_tells = source == ModelSource.LATHE.value
-                if source == ModelSource.PARAMETERS.value:
-                    self._machine = machine_from(known)
-            if self._lathe_tells and self._lathe_values:
-                self._machine = machine_from(self._lathe_values)
+            else:
+                self._monitor_values = known
+            source = self._monitor_values.get('model', ModelSource.NONE.value)
+            described = self._monitor_values
+            if source == ModelSource.LATHE.value:
+                described = self._lathe_values
+            if described and source != ModelSource.NONE.value:
+                self._machine = machine_from(described)
         except LatheChatterError as error:
             self.get_logger().error(f'{name} does not say what it is: {error}')
 
@@ -189,15 +197,23 @@ class SupervisorNode(ParameterNode):
         self._cut = cut_from(self._lathe_values)
         self._cutting_stiffness = math.nan  # of the cut before
 
+    def _believed(self) -> Machine | None:
+        """The machine as the monitor takes it, None where it believes none."""
+        if self._machine is None or self._works not in _BELIEVED:
+            return None
+        return with_tool_at(self._machine, self._tool_frequency)
+
     # -- acting --------------------------------------------------------------------------------
 
     def _seen(self, cut: Cut) -> Seen:
         now = time.monotonic()
+        # What is not known any more is not published any more.
+        figures = {n: value for n, (value, at) in self._figures.items() if now < at + _SILENCE}
         return Seen(
             now,
             cut,
             self._chatter,
-            **self._figures,
+            **figures,
             cutting_stiffness=self._cutting_stiffness,
             spindle_acceleration=float(self._lathe_values.get('spindle_acceleration', 0.0)),
             hindrance=self._hindrance(now),

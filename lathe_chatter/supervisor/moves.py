@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,9 +24,9 @@ from lathe_chatter.stability import (
     stable_speed_intervals,
 )
 
-_RESERVES = (0.12, 0.04)
+_RESERVES = (0.25, 0.12, 0.04)
 """Parts by which a deeper cut must be stable still, wished and needed."""
-_EDGE, _LEAST_EDGE = 0.04, 0.012
+_EDGE, _LEAST_EDGE = 0.08, 0.012
 """Parts of a speed that it stays away from the edges of its stable speeds, wished and needed."""
 _DEPTHS = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5, 0.4, 0.3, 0.2, 0.1)
 _SHORT_WAY = 0.05
@@ -34,6 +34,8 @@ _SHORT_WAY = 0.05
 _SURE_DECAY = -1.0
 """Growth rate below which a varied speed is believed to help, 1/s."""
 _ROUNDING = 1e-9
+_NEARLY_ALL = 0.9
+"""Of the removal rate: a move that keeps it leaves no need to look for others than speeds."""
 _NEAREST = 4
 """Intervals of stable speeds that are looked into, the nearest ones."""
 _SLOWEST_SWING = 0.2
@@ -172,14 +174,19 @@ def moves_for(machine: Machine, cut: Cut, limits: Limits, amplitude: float = 0.0
     every = regimes_of(machine, cut)
     single = [(each,) for each in every if each.machine == machine and len(every) > 1]
     for regimes in (every, *single):
-        for reserve in _RESERVES:
-            search = _Search(cut, limits, amplitude, process, regimes, reserve)
-            found += search.constant_speeds()
-            if not any(move.kept > 0.99 for move in found):
+        searches = [
+            _Search(cut, limits, amplitude, process, regimes, reserve) for reserve in _RESERVES
+        ]
+        for search in searches:
+            found += search.constant_speeds(_DEPTHS[:1])
+        if not any(move.kept > _NEARLY_ALL for move in found):
+            for search in searches:
+                found += search.constant_speeds(_DEPTHS[1:])
                 found += [*search.varied_speeds(), *search.smaller_feeds()]
-            if found:
-                found.sort(key=lambda move: -move.worth)
-                return found
+                if found:
+                    break
+        if found:
+            return sorted(found, key=lambda move: -move.worth)
     return found
 
 
@@ -194,11 +201,11 @@ class _Search:
     regimes: tuple[Regime, ...]
     reserve: float
 
-    def constant_speeds(self) -> list[Move]:
-        """Speeds at the present depth, or at less of it."""
+    def constant_speeds(self, parts: Sequence[float]) -> list[Move]:
+        """Speeds at parts of the present depth, from the deepest that has some."""
         found: list[Move] = []
         deepest = self.cut.depth_of_cut
-        for part in _DEPTHS:
+        for part in parts:
             depth = part * deepest
             if depth < self.limits.smallest_depth and part < 1.0:
                 break
@@ -295,6 +302,7 @@ class _Search:
         before = removal_rate(self.cut)
         kept = min(removal_rate(new) / before, 1.0) if before else 1.0
         away = abs(math.log(new.spindle_speed_rpm / self.cut.spindle_speed_rpm))
+        sureness *= min(0.7 + 2.0 * self.reserve, 1.0)
         worth = kept * (0.5 + 0.5 * sureness) - _SHORT_WAY * away
         yield Move(new, growth_of(self.regimes, new), margin, kept, worth)
 
@@ -342,3 +350,11 @@ def heard(machine: Machine, cut: Cut, cutting_stiffness: float) -> Machine:
     if not 0.0 < told < cutting_stiffness < _MOST_HEARD * told:
         return machine
     return replace(machine, cutting_coefficient=cutting_stiffness / cut.depth_of_cut)
+
+
+def with_tool_at(machine: Machine, frequency: float) -> Machine:
+    """The machine whose tool is heard at a natural frequency, Hz; as told where that is nan."""
+    if not math.isfinite(frequency) or len(machine.tool.modes) > 1:
+        return machine
+    tool = replace(machine.tool.modes[0], natural_frequency=2.0 * math.pi * frequency)
+    return replace(machine, tool=tool)

@@ -29,8 +29,8 @@ _LASTING = 1.0
 """s that a margin must lie below its limit."""
 _SAME = 0.01
 """Part by which cuts must differ of which one was tried."""
-_DOUBT = 1.1
-"""Times its C w that a cut is taken to have for every move that was no cure."""
+_DOUBT, _MOST_DOUBT = 1.25, 2.0
+"""Times its C w that a cut is taken to have after every move that was no cure, and at most."""
 
 
 class Mode(str, Enum):
@@ -127,12 +127,12 @@ class Supervisor:
         self._hand_at = -math.inf
         self._levels: deque[tuple[float, float]] = deque()
         self._safe_since = math.nan
-        self._warned = False
+        self._warned, self._doubt = False, 1.0
         self._forget()
 
     def _forget(self) -> None:
         """There is no chatter."""
-        self.moves = 0
+        self.moves = self._doubted = 0
         self._alarm_at = math.nan
         self._tried: list[Cut] = []
         self._offer: tuple[Cut, Action, float] | None = None
@@ -203,8 +203,11 @@ class Supervisor:
         if self.machine is None:
             return None
         machine = heard(self.machine, seen.cut, seen.cutting_stiffness)
-        doubt = _DOUBT**self.moves
-        machine = replace(machine, cutting_coefficient=doubt * machine.cutting_coefficient)
+        if self.moves > self._doubted:  # the machine is not as it was told
+            self._doubted = self.moves
+            self._doubt = min(_DOUBT * self._doubt, _MOST_DOUBT)
+        coefficient = self._doubt * machine.cutting_coefficient
+        machine = replace(machine, cutting_coefficient=coefficient)
         amplitude = seen.amplitude if math.isfinite(seen.amplitude) else 0.0
         self._judge_at = seen.time + _AGAIN
         for move in moves_for(machine, seen.cut, self.limits, amplitude):

@@ -96,6 +96,44 @@ def test_in_shadow_it_does_nothing(cell: Callable[..., Cell]) -> None:
     assert (there.get('spindle_speed_rpm'), there.get('depth_of_cut')) == (3000.0, DEEP)
 
 
+def test_while_a_hand_is_at_the_machine_nothing_is_done(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=act', 'hands_off:=60.0')
+    there.deepen()
+    there.await_words('nothing is done, for somebody else has just changed something')
+    assert (there.get('spindle_speed_rpm'), there.get('depth_of_cut')) == (3000.0, DEEP)
+
+
+def test_of_two_supervisors_none_acts(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=act')
+    there.nodes.start('chatter_supervisor', 'mode:=act', 'hands_off:=0.5')
+    there.bench.spin_until(
+        lambda: there.bench.node.count_publishers(f'{SUPERVISOR}/action') == 2, 'the other one'
+    )
+    there.bench.spin_until(lambda: 'another supervisor' in there.status(), 'that they see it')
+    there.deepen()
+    there.await_words('nothing is done, for there is another supervisor')
+    assert there.get('spindle_speed_rpm') == 3000.0
+
+
+def test_a_killed_supervisor_leaves_the_lathe_as_it_is(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=ask')
+    there.deepen()
+    there.await_words('~/accept does it')
+    there.nodes.kill('/chatter_supervisor')
+    there.flags.clear()
+    assert (there.get('spindle_speed_rpm'), there.get('depth_of_cut')) == (3000.0, DEEP)
+    assert there.bench.set_together(LATHE, depth_of_cut=1e-4).successful
+    there.bench.spin_until(lambda: there.flags and not there.flags[-1].data, 'a lathe that cuts')
+
+
+def test_a_silent_monitor_keeps_it_from_acting(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=act', 'hands_off:=1.5')
+    there.deepen()
+    there.nodes.kill('/chatter_monitor')
+    there.await_words('nothing is done, for nothing comes from the monitor')
+    assert there.get('spindle_speed_rpm') == 3000.0
+
+
 @pytest.mark.parametrize(
     ('override', 'words'),
     [
