@@ -142,7 +142,7 @@ class Processes(Executor):
     def __init__(self, workers: int | None = None) -> None:
         """Begin none yet."""
         self._max_workers = workers or cores()
-        self._lock, self._pool = threading.Lock(), self._new()
+        self._lock, self._pool, self._closed = threading.Lock(), self._new(), False
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """See Executor."""
@@ -152,10 +152,12 @@ class Processes(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 -- Executor's
         """See Executor."""
+        self._closed = True
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def __exit__(self, kind: object, *_rest: object) -> None:
         """Wait for what was begun; where something went wrong here, end it at once."""
+        self._closed = True  # nobody does the work of those that end here
         begun = getattr(self._pool, '_processes', None) if kind else None
         for process in list((begun or {}).values()):
             process.terminate()
@@ -167,6 +169,8 @@ class Processes(Executor):
 
     def _begin(self, outer: Future[Any], call: Callable[[], Any], retries: int) -> None:
         with self._lock:
+            if self._closed:
+                raise RuntimeError('The processes were ended: they take no more work.')
             # Ctrl-C does not reach what is started here: this process ends it.
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
@@ -182,7 +186,16 @@ class Processes(Executor):
         self, outer: Future[Any], call: Callable[[], Any], retries: int, inner: Future[Any]
     ) -> None:
         error = futures.CancelledError() if inner.cancelled() else inner.exception()
-        if isinstance(error, futures.BrokenExecutor) and retries and not outer.cancelled():
-            self._begin(outer, call, retries - 1)
+        broken = isinstance(error, futures.BrokenExecutor)
+        if broken and retries and not self._closed and not outer.cancelled():
+            # Not in this thread: it may hold the lock of the pool that broke.
+            threading.Thread(target=self._again, args=(outer, call, retries - 1)).start()
         elif outer.set_running_or_notify_cancel():
             outer.set_exception(error) if error else outer.set_result(inner.result())
+
+    def _again(self, outer: Future[Any], call: Callable[[], Any], retries: int) -> None:
+        try:
+            self._begin(outer, call, retries)
+        except RuntimeError as error:
+            if outer.set_running_or_notify_cancel():
+                outer.set_exception(error)
