@@ -109,7 +109,8 @@ def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
     file = ResultFile(path, {**header, 'code': code_identity()}) if path else None
     with closing(file) if file else nullcontext():
         found = {e['place']: e['result'] for e in (file.entries if file else ())}
-        progress(len(found))
+        if found:
+            progress(len(found))
         missing = [k for k in range(len(items)) if k not in found]
         batches = batches_of(missing, executor)
         wanted = ([items[k] for k in batch] for batch in batches)
