@@ -284,6 +284,8 @@ class _Search:
     def _move(self, changes: dict[str, float], sureness: float) -> Iterator[Move]:
         """A move to a changed cut, if it is stable there, and on the way."""
         new = self.cut.with_changes(**changes)
+        if new.feed < min(self.limits.smallest_feed, self.cut.feed):
+            return  # a faster spindle turns more often while the feed speed stays
         deeper = new.with_changes(depth_of_cut=(1.0 + self.reserve) * new.depth_of_cut)
         varied = new.speed_variation_amplitude > 0.0
         machine, seated = self.regimes[0]

@@ -23,8 +23,8 @@ _FALLEN = 0.5
 """Part of what it was at the move, to which it must have fallen where it falls no more."""
 _BEYOND = 0.2
 """s that vibration must be beyond its limit, and not fall, for a stop."""
-_STEP = 0.02
-"""s from one speed of a ramp to the next."""
+_STEP, _LONGEST_STEP = 0.02, 0.08
+"""s from one speed of a ramp to the next, and that count at most."""
 _LASTING = 1.0
 """s that a margin must lie below its limit."""
 _SAME = 0.01
@@ -91,9 +91,9 @@ class Action:
 class _Ramp:
     """The spindle is on its way."""
 
-    start: float
+    rpm: float
     target: float
-    began: float
+    time: float
 
 
 class Supervisor:
@@ -261,10 +261,12 @@ class Supervisor:
         if ramp is None or seen.time < self._next_step:
             return None
         self._next_step = seen.time + _STEP
-        gone = self.limits.ramp * (seen.time - ramp.began + _STEP)
-        left = ramp.target - ramp.start
-        rpm = ramp.start + math.copysign(min(gone, abs(left)), left)
-        if gone >= abs(left):
+        # Where looks come late the ramp takes longer: it has no greater steps for that.
+        lasted = min(seen.time - ramp.time + _STEP, _LONGEST_STEP)
+        step, left = self.limits.ramp * lasted, ramp.target - ramp.rpm
+        rpm = ramp.rpm + math.copysign(min(step, abs(left)), left)
+        self._ramp = _Ramp(rpm, ramp.target, seen.time + _STEP)
+        if step >= abs(left):
             self._ramp, rpm = None, ramp.target
             self._judge_at = seen.time + self._settling
         return Action(changes={'spindle_speed_rpm': rpm})
