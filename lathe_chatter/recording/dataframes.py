@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from lathe_chatter.errors import optional
-from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.recording.sample_blocks import TIME
 from lathe_chatter.recording.sample_series import Samples
 from lathe_chatter.samples.columns import UNITS
 

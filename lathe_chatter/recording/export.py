@@ -17,7 +17,7 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError, optional
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.recording.sample_blocks import TIME
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.samples.columns import UNITS
 from lathe_chatter.samples.continuity import Continuity, time_text

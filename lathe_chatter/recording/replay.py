@@ -14,7 +14,7 @@ from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.cut_events import BEGINNING, Change, Knock
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.recording.cut_log import CutLog, CutSession
-from lathe_chatter.recording.sample_reader import SampleBlocks
+from lathe_chatter.recording.sample_blocks import SampleBlocks
 
 _MAX_SAMPLES = 50_000
 """Samples that are computed at once where the record has none."""

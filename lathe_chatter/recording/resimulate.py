@@ -25,7 +25,7 @@ from lathe_chatter.recording.recorded_cuts import RecordedCuts, recorded_cuts
 from lathe_chatter.recording.replay import Difference, Replay
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import blocks_as_written
-from lathe_chatter.recording.sample_reader import SampleBlocks
+from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.recording.verify import Finding
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 

@@ -18,8 +18,8 @@ from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.decoding import Recorded, decoded
 from lathe_chatter.recording.mcap_file import Contents, Note, Raw, RecordedFile
 from lathe_chatter.recording.mcap_reader import Damage
+from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.recording.sample_order import sample_blocks
-from lathe_chatter.recording.sample_reader import TIME, SampleBlocks
 from lathe_chatter.recording.sample_series import Samples, joined, selection
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 

@@ -19,7 +19,7 @@ from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
 from lathe_chatter.recording.mcap_file import Raw, RecordedFile
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.sample_reader import TIME, SampleBlocks
+from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 
 _STEP_BACK = 10_000_000
 """ns by which stamps of one topic go back where the clock does, and never else."""

@@ -12,7 +12,8 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.recording.mcap_file import RecordedFile
-from lathe_chatter.recording.sample_reader import SampleBlocks, as_received, as_written
+from lathe_chatter.recording.sample_blocks import SampleBlocks
+from lathe_chatter.recording.sample_reader import as_received, as_written
 
 
 def sample_blocks(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.errors import LayoutError, ParameterError
-from lathe_chatter.recording.sample_reader import SampleBlocks
+from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.samples.continuity import Continuity, time_text
 
 if TYPE_CHECKING:

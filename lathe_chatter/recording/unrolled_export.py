@@ -15,7 +15,7 @@ from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import Timeline, read_timeline
-from lathe_chatter.recording.sample_reader import TIME
+from lathe_chatter.recording.sample_blocks import TIME
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples.codec import encode_number

@@ -25,7 +25,7 @@ from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, message_of, recorded_cuts
 from lathe_chatter.recording.run_timeline import Placed, blocks_as_written
-from lathe_chatter.recording.sample_reader import TIME, SampleBlocks
+from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.report.plotted_samples import RunSamples
 
 _MONITOR = 'chatter_monitor/'

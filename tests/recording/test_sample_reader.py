@@ -1,4 +1,4 @@
-"""Long runs are read by their index, in threads: the same arrays, and damage is found as well."""
+"""Runs are read by their index: the same arrays, and damage is found as well."""
 
 from __future__ import annotations
 
