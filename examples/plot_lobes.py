@@ -7,7 +7,6 @@ mean force presses the workpiece onto its bearing, and the limit of the seated m
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import lathe_chatter as lc
 
@@ -15,6 +14,7 @@ cut = lc.Cut(spindle_speed_rpm=3000.0, depth_of_cut=0.00062, bearing_clearance=5
 figure, axes = plt.subplots(figsize=(8, 4.5), layout='constrained')
 lc.plot_lobes(lc.Machine(), cut, axes=axes)
 for seated in (False, True):
-    limit = lc.critical_depth(lc.Machine(), 2 * np.pi * 50.0, seated=seated)
-    print(f'{"seated" if seated else "open"}: {limit * 1e3:.4f} mm at 3000 rev/min')
+    limit = lc.critical_depth(lc.Machine(), 3000.0, seated=seated)
+    name = 'seated' if seated else 'open'
+    print(f'{name}: {limit * 1e3:.4f} mm at 3000 rev/min')
 plt.show()

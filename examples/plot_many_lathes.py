@@ -20,7 +20,7 @@ once_per_turn = samples[::200, :, 0] * 1e6  # um
 
 figure, axes = plt.subplots(figsize=(8, 4.5), layout='constrained')
 axes.plot(np.tile(depths * 1e3, (len(once_per_turn), 1)), once_per_turn, 'k.', markersize=1.5)
-limit = lc.critical_depth(lc.Machine(), 2 * np.pi * 50.0, seated=False)
+limit = lc.critical_depth(lc.Machine(), 3000.0, seated=False)
 axes.axvline(limit * 1e3, linestyle='--', label='limit by the characteristic equation')
 axes.set_xlabel('depth of cut / mm')
 axes.set_ylabel('tool, once in every turn / um')

@@ -140,6 +140,10 @@ class FrequencyResponseError(LatheChatterError, ValueError):
     """A file that holds no frequency response that can be used, and why."""
 
 
+class SignalFileError(LatheChatterError, ValueError):
+    """A recording of sensors that cannot be listened to, and why."""
+
+
 class ModalFitError(LatheChatterError, ValueError):
     """Frequency responses to which no modes can be fitted, and why."""
 
@@ -172,9 +176,9 @@ class OutputError(LatheChatterError):
     """A file or folder that cannot be written, or that would be lost by writing it."""
 
 
-def reason_of(error: OSError) -> str:
+def reason_of(error: Exception) -> str:
     """Why the system refused, in its words: without the number and the file, which is known."""
-    return error.strerror or str(error)
+    return getattr(error, 'strerror', None) or str(error)
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str | None:

@@ -39,6 +39,7 @@ ARROWS = {
     'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'lathe', 'detection', 'recording'},
+    'listening': {'detection', 'recording'},
     'dataset': {'model', 'samples', 'lathe', 'stability', 'scenario'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
@@ -51,6 +52,7 @@ ARROWS = {
     'cli': {
         *('model', 'samples', 'lathe', 'stability', 'detection', 'knocks', 'supervisor'),
         *('precompile', 'recording', 'scenario', 'dataset', 'report', 'paper', 'page', 'nodes'),
+        'listening',
         'tap_test',
     },
 }

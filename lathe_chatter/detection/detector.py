@@ -12,7 +12,14 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.detection.block_loop import take_hops
 from lathe_chatter.detection.detector_state import CHATTER, HOPS, UNKNOWN, WINDOWS, new_state
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
-from lathe_chatter.detection.filters import band_of, design, gain, thinning_of
+from lathe_chatter.detection.filters import (
+    UNKNOWN_MACHINE,
+    Band,
+    band_of,
+    design,
+    gain,
+    thinning_of,
+)
 from lathe_chatter.detection.framing import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
 from lathe_chatter.detection.machine_fit import MachineFit, Verdict
@@ -29,6 +36,7 @@ _CARRIED = 1000
 """Hops that an alarm of other sensors is said to be old: its advice stands."""
 _UNSUSPICIOUS = 0.5
 """Score below which the machine may be corrected: the baseline begins anew with it."""
+_NYQUIST = 0.5
 _HOP = 0.01
 """Length of a hop, about, s: what is judged together, against the decay of the resonators."""
 
@@ -36,9 +44,10 @@ _HOP = 0.01
 class ChatterDetector:
     """Flags chatter from what sensors on a machine would see.
 
-    It uses the columns `tool_displacement`, `workpiece_displacement` and `spindle_angle` as far
-    as they are there (a displacement has to be), never the chip thickness or the force. Nothing
-    depends on how the samples were cut into batches.
+    It uses the columns `spindle_angle` and `tool_` and `workpiece_` `displacement`, `velocity` or
+    `acceleration` (m, m/s, m/s2) as far as they are there, or a `sound` or `force` alone, never
+    the chip thickness or the cutting force. Nothing depends on how the samples were cut into
+    batches.
 
     Args:
         machine: Tool, workpiece and bearing as an impact test would give them; None where
@@ -49,9 +58,11 @@ class ChatterDetector:
             `forced`, m.
         strictness: The score that makes an alarm; 1 for the figures in the README, more for
             fewer alarms.
+        unknown_band: Lowest and highest frequency of chatter that is looked for where no machine
+            is known, Hz.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 -- what may be told it
         self,
         machine: Machine | None = _PAPER,
         *,
@@ -59,6 +70,7 @@ class ChatterDetector:
         smallest_amplitude: float = 1e-10,
         forced_amplitude: float = 10e-6,
         strictness: float = 1.0,
+        unknown_band: tuple[float, float] = UNKNOWN_MACHINE,
     ) -> None:
         """Begin with nothing known."""
         self._told = machine
@@ -69,6 +81,8 @@ class ChatterDetector:
         self._smallest = smallest_amplitude
         self._forced = forced_amplitude
         self._strictness = strictness
+        self._unknown = Band(*unknown_band)
+        self._mixed = False
         self.reset()
 
     def _forget(self) -> None:
@@ -127,18 +141,24 @@ class ChatterDetector:
 
     def _prepare(self, form: StreamFormat) -> None:
         """Get ready for a stretch with this rate and these channels."""
-        mode = Mode.of(self._machine, angle=form.angle, workpiece=form.workpiece)
+        self._mixed = form.mixed
+        mode = Mode.of(self._machine, angle=form.angle, workpiece=form.workpiece, mixed=form.mixed)
+        band = band_of(self._machine, self._unknown)
+        if band.high > _NYQUIST * form.rate:
+            mode = Mode.TOO_SLOW
         if self._prepared == (form.rate, mode):
             self._framer.hop = self._hop
             return
         self._prepared, self._mode = (form.rate, mode), mode
+        if mode is Mode.TOO_SLOW:
+            self._hop = self._framer.hop = max(1, round(_HOP * form.rate))
+            return
         machine = self._machine
-        thinning, stride = thinning_of(machine, form.rate)
+        thinning, stride = thinning_of(machine, form.rate, self._unknown)
         self._thinned = form.rate / thinning
         outputs = max(1, round(_HOP * self._thinned / stride))
         self._hop = self._framer.hop = thinning * stride * outputs
-        self._kernels = design(machine, self._thinned, _DECAY)
-        band = band_of(machine)
+        self._kernels = design(machine, self._thinned, _DECAY, self._unknown)
         self._mechanics = mechanics_of(machine or _PAPER, *band)
         self._settings = record(
             SETTINGS,
@@ -146,7 +166,7 @@ class ChatterDetector:
             period=self._hop / form.rate,
             gain=gain(self._kernels, self._thinned, band.middle),
             tool_stiffness=machine.tool.stiffness if machine is not None else 0.0,
-            forced_amplitude=self._forced,
+            forced_amplitude=math.inf if form.mixed else self._forced,
             slowest_turns=self._speed_range[0] / 60.0,
             hop=self._hop,
             thinning=thinning,
@@ -179,7 +199,7 @@ class ChatterDetector:
 
     def _start_stretch(self) -> None:
         """After a gap: no signal reaches across it, the alarm and what is usual do."""
-        if self._prepared is None:
+        if self._prepared is None or self._mode is Mode.TOO_SLOW:
             return
         turn = self._thinned / max(self._speed_range[0] / 60.0, 0.5)
         self._memory = new_memory(turn, self._kernels, int(self._settings['stride'][0]))
@@ -193,6 +213,10 @@ class ChatterDetector:
 
     def _take(self, hops: HopBlock) -> None:
         """Judge some hops; stop where a speed has to be recommended."""
+        if self._mode is Mode.TOO_SLOW:
+            alarmed, time = self._estimate.chatter, float(hops.times[-1])
+            self._estimate = Estimate(time, chatter=alarmed, mode=Mode.TOO_SLOW)
+            return
         done, now = 0, self._now
         count = len(hops.block) // self._hop
         while done < count:
@@ -292,6 +316,8 @@ class ChatterDetector:
         if self._machine is not None and math.isfinite(stiffness):
             bearing = self._machine.bearing_stiffness
             engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
+        if self._mixed:  # neither metres nor a growth rate that is one body's
+            now |= dict.fromkeys(('growth', 'growth_error', 'amplitude'), math.nan)
         return Estimate(
             time,
             STATES[now['state']],

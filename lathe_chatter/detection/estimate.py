@@ -28,15 +28,21 @@ class Mode(str, Enum):
     CORRECTED = 'both displacements, and the machine with its tool as it is heard'
     MISFIT = 'no machine, for the one that was told does not fit what is heard'
     MANY_MODES = 'no machine, for the one that was told has more than a mode each'
-    ONE_SENSOR = 'one displacement only'
+    ONE_SENSOR = 'the motion of one body only'
+    MIXTURE = 'sound or force alone, which does not tell how fast a vibration grows'
     NO_MACHINE = 'the machine is not known'
     NO_SPINDLE = 'the spindle is not seen'
-    BLIND = 'no displacement that can be believed'
+    BLIND = 'no sensor that can be believed'
+    TOO_SLOW = 'a sample rate that is too low for the frequencies of the machine'
     WAITING = 'no samples yet'
 
     @classmethod
-    def of(cls, machine: Machine | None, *, angle: bool, workpiece: bool) -> Mode:
+    def of(
+        cls, machine: Machine | None, *, angle: bool, workpiece: bool, mixed: bool = False
+    ) -> Mode:
         """The mode for what is there; the gravest lack names it."""
+        if mixed:
+            return cls.MIXTURE if angle else cls.NO_SPINDLE
         if not angle:
             return cls.NO_SPINDLE
         if not workpiece:

@@ -73,10 +73,10 @@ class Kernels(NamedTuple):
 BAND_BAND, FORCE_BAND, FORCE_FORCE, INERTIA_BAND, SPILLS = range(5)
 
 
-def band_of(machine: Machine | None) -> Band:
-    """The band that holds the chatter of a machine, open or seated."""
+def band_of(machine: Machine | None, unknown: Band = UNKNOWN_MACHINE) -> Band:
+    """The band that holds the chatter of a machine, open or seated; `unknown` without one."""
     if machine is None:
-        return UNKNOWN_MACHINE
+        return unknown
     lowest, highest = _frequencies(machine)
     return Band(BELOW * lowest, ABOVE * highest)
 
@@ -89,15 +89,18 @@ def _frequencies(machine: Machine) -> tuple[float, float]:
     return min(tool, workpiece) / turn, max(tool, workpiece, math.sqrt(seated)) / turn
 
 
-def design(machine: Machine | None, rate: float, decay: float) -> Kernels:
+def design(
+    machine: Machine | None, rate: float, decay: float, unknown: Band = UNKNOWN_MACHINE
+) -> Kernels:
     """The kernels for thinned samples at `rate` Hz; without a machine the force is zero.
 
     Args:
         machine: Tool, workpiece and bearing, or None.
         rate: Of the thinned samples, Hz.
         decay: Of the resonators, 1/s.
+        unknown: The band where there is no machine.
     """
-    chatter = band_of(machine)
+    chatter = band_of(machine, unknown)
     wide = chatter
     if machine is not None:
         lowest, highest = _frequencies(machine)
@@ -141,9 +144,11 @@ def design(machine: Machine | None, rate: float, decay: float) -> Kernels:
     )
 
 
-def thinning_of(machine: Machine | None, rate: float) -> tuple[int, int]:
+def thinning_of(
+    machine: Machine | None, rate: float, unknown: Band = UNKNOWN_MACHINE
+) -> tuple[int, int]:
     """Samples in a thinned sample, and thinned samples in an output, at a sample rate, Hz."""
-    band = band_of(machine)
+    band = band_of(machine, unknown)
     thinning = max(1, int(rate / (_RATES_PER_WIDTH * band.high)))
     return thinning, max(1, round(rate / thinning / (2.25 * band.high)))
 

@@ -13,14 +13,10 @@ from numpy.typing import NDArray
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.channel_watch import faults_of, new_channels, watch_channels
+from lathe_chatter.detection.motion_filter import MotionFilter, Sensors, sensors_among
 from lathe_chatter.errors import LayoutError
 
-_TIME, _ANGLE, _TOOL, _WORKPIECE = (
-    'time',
-    'spindle_angle',
-    'tool_displacement',
-    'workpiece_displacement',
-)
+_TIME, _ANGLE = 'time', 'spindle_angle'
 _RATE_SAMPLES = 33
 """Samples at the start of a stretch from which its sample rate is taken."""
 
@@ -40,11 +36,13 @@ class StreamFormat(NamedTuple):
         rate: Samples a second, Hz.
         angle: Whether the spindle angle is seen.
         workpiece: Whether both displacements are; with one it stands where the tool's would.
+        mixed: Whether the one signal is a sound or a force instead of the motion of a body.
     """
 
     rate: float
     angle: bool
     workpiece: bool
+    mixed: bool = False
 
 
 class HopBlock(NamedTuple):
@@ -53,7 +51,7 @@ class HopBlock(NamedTuple):
     Attributes:
         times: Of the samples (n,), s.
         block: Spindle angle, tool and workpiece displacement (n, 3), rev and m; 0 where there
-            is none.
+            is none. From other sensors the displacements are without what is below 15 Hz.
     """
 
     times: Array
@@ -83,6 +81,8 @@ class Framer:
         self._places: NDArray[np.int64] = np.full(5, -1)
         self._incomplete = False
         self._labels: tuple[str, ...] = ()
+        self._sensors = Sensors('', '', (0, 0), mixed=False)
+        self._filter: MotionFilter | None = None
         self.blind = False
         self._channels, self._causes = new_channels(), 0
 
@@ -139,6 +139,8 @@ class Framer:
     def _block(self, rows: Array) -> Array:
         """Angle, tool and workpiece (n, 3); one sensor alone stands for the tool's."""
         block = rows[:, 1:4].copy()
+        if self._filter is not None:
+            self._filter.apply(block[:, 1:])
         if self._dead[2]:
             block[:, 1], block[:, 2] = block[:, 2], 0.0
         block[:, [self._dead[1], False, self._dead[3]]] = 0.0
@@ -157,7 +159,9 @@ class Framer:
             return None
         if _unbroken(first, self._last, self._step, self._dead) < _RATE_SAMPLES:
             return None
-        return StreamFormat(1.0 / self._step, not self._dead[1], not self._dead[2:].any())
+        rate, sensors = 1.0 / self._step, self._sensors
+        self._filter = MotionFilter(sensors.orders, rate) if sensors.filtered else None
+        return StreamFormat(rate, not self._dead[1], not self._dead[2:].any(), sensors.mixed)
 
     def _drop_to_break(self, rows: Array, at: int) -> tuple[bool, Array]:
         """Drop what is held up to the break; a stretch begins with the next sample."""
@@ -177,13 +181,20 @@ class Framer:
         """Time, angle, tool, workpiece and health (n, 5), nan where there is no such column."""
         names = tuple(columns)
         if names != self._names:
-            wanted = (_TIME, _ANGLE, _TOOL, _WORKPIECE)
-            places = [names.index(name) if name in names else -1 for name in wanted]
-            if places[0] < 0 or max(places[2:]) < 0:
-                lacking = _TIME if places[0] < 0 else f'{_TOOL} and no {_WORKPIECE}'
+            sensors = sensors_among(names)
+            if _TIME not in names or sensors is None:
+                motion = (
+                    'displacement, velocity or acceleration of tool or workpiece, sound or force'
+                )
+                lacking = motion if _TIME in names else _TIME
                 raise LayoutError(
                     f'The samples have no column {lacking}, only {", ".join(names)}.'
                 )
+            wanted = (_TIME, _ANGLE, sensors.tool, sensors.workpiece)
+            places = [names.index(name) if name in names else -1 for name in wanted]
+            if self._sensors != sensors:
+                self._sensors = sensors
+                self.restart_stretch()
             self._names, self._places = names, np.array([*places, 0])
             self._incomplete = min(places) < 0
             self._labels = tuple(name if name in names else '' for name in wanted[1:])

@@ -1,0 +1,147 @@
+"""`lathe-chatter listen`: the monitor over a recording of any shop."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, Namespace
+from dataclasses import asdict
+from pathlib import Path
+
+from lathe_chatter.cli.common_options import add_force, add_json, in_unit, picture_file
+from lathe_chatter.cli.console import Screen, keep_existing, writing
+from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.detection.filters import UNKNOWN_MACHINE
+from lathe_chatter.detection.motion_filter import sensors_among
+from lathe_chatter.errors import ParameterError, SignalFileError
+from lathe_chatter.listening import Judged, Score, judge, read_signals, score
+from lathe_chatter.listening.judging import read_labels
+from lathe_chatter.model.machine_file import load_machine
+from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.plot_style import files_of_picture
+
+NAME = 'listen'
+HELP = 'have the monitor judge a recording: WAV, CSV, MAT, Parquet, or a recorded run'
+EXAMPLE = 'lathe-chatter listen shop.wav --band 500:1500 --labels shop.csv --output heard.png'
+
+_FREQUENCY = Quantity('a frequency', 'Hz', high=1e6, exclusive=True)
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument('recording', type=Path, metavar='FILE', help='the recording')
+    parser.add_argument(
+        '--columns', metavar='NAMES',
+        help='what its columns or channels are, with commas: time, spindle_angle (rev), tool_ and '
+        'workpiece_ displacement, velocity or acceleration (SI), sound, force (default: their '
+        'names in the file; the one channel of a WAV is sound)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--rate', type=in_unit('Hz'), metavar='HZ', help='sample rate, where there are no times'
+    )
+    parser.add_argument(
+        '--machine', metavar='FILE', help='machine file, or the name of one that is shipped'
+    )
+    parser.add_argument(
+        '--band', metavar='LOW:HIGH',
+        help='where chatter is looked for without a machine, Hz (default: '
+        f'{UNKNOWN_MACHINE.low:g}:{UNKNOWN_MACHINE.high:g}); the narrower, the surer',
+    )  # fmt: skip
+    parser.add_argument(
+        '--labels', type=Path, metavar='CSV',
+        help='rows of start, end (s) and state: scores the flag against those that say chatter',
+    )  # fmt: skip
+    parser.add_argument('--output', type=Path, metavar='FILE', help='picture to write')
+    add_force(parser)
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
+    """Listen, print, draw."""
+    screen = Screen(json=options.json)
+    if options.output is not None:
+        keep_existing(*files_of_picture(picture_file(options.output)), force=options.force)
+    columns = options.columns and [name.strip() for name in options.columns.split(',')]
+    rate = None if options.rate is None else _FREQUENCY.check('--rate', options.rate)
+    labels = [] if options.labels is None else read_labels(options.labels)
+    signals = read_signals(options.recording, columns=columns, rate=rate)
+    sensors = sensors_among(signals.columns)
+    if sensors is None:
+        raise SignalFileError(
+            f'{options.recording} has the columns {", ".join(signals.columns)}: none of them is a '
+            'sensor by its name; --columns says what they are.'
+        )
+    machine = None if options.machine is None else load_machine(options.machine).machine
+    detector = ChatterDetector(machine, unknown_band=_band(options.band))
+    screen.compile()
+    with screen.progress('listening', len(signals.samples) / signals.rate, 's') as bar:
+        judged = judge(signals, detector, bar.advance)
+    found = score(judged, labels) if labels else None
+    _show(screen, judged, found)
+    if options.output is not None:
+        from lathe_chatter.listening.picture import draw_judged
+
+        with writing(options.output):
+            draw_judged(signals, sensors.tool or sensors.workpiece, judged, labels, options.output)
+        screen.name_file('picture', options.output)
+    screen.json(
+        {
+            'recording': options.recording,
+            'works_with': judged.estimates[-1].mode.value,
+            'states': [
+                {
+                    'time': each.time, 'state': each.state, 'chatter': each.chatter,
+                    'frequency': each.frequency, 'growth_rate': each.growth_rate,
+                }
+                for each in judged.changes()
+            ],
+            'flagged_share': float(judged.flagged.mean()),
+            'score': None if found is None else asdict(found),
+        }
+    )  # fmt: skip
+    return 0
+
+
+def _band(text: str | None) -> tuple[float, float]:
+    if text is None:
+        return UNKNOWN_MACHINE
+    parts = text.split(':')
+    try:
+        low, high = (float(part) for part in parts)
+    except ValueError:
+        raise ParameterError('--band', text, 'Hz', 'two numbers, as 500:1500') from None
+    _FREQUENCY.check('--band', low), _FREQUENCY.check('--band', high)
+    if not low < high:
+        raise ParameterError('--band', text, 'Hz', 'a lower and a higher frequency, as 500:1500')
+    return low, high
+
+
+def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
+    rows = [
+        (
+            f'{each.time:.2f}',
+            each.state,
+            _known(each.frequency, '.1f'),
+            _known(each.growth_rate, '+.2f'),
+        )
+        for each in judged.changes()
+    ]
+    titles = {
+        'from / s': 'right',
+        'state': 'left',
+        'frequency / Hz': 'right',
+        'growth / (1/s)': 'right',
+    }
+    screen.table(titles, rows)
+    screen.say(f'works with  {judged.estimates[-1].mode.value}')
+    screen.say(f'flagged     {judged.flagged.mean():.1%} of the time')
+    if found is not None:
+        delay = 'none' if math.isnan(found.delay) else f'{found.delay:.2f} s (median)'
+        screen.say(
+            f'labels      F1 of seconds {_known(found.f1, ".3f") or "none: no chatter in them"}, '
+            f'{found.found} of {found.events} events, delay {delay}, {found.false_alarms} false '
+            f'alarms in {found.quiet_hours:.3g} quiet hours'
+        )
+
+
+def _known(value: float, form: str) -> str:
+    return f'{value:{form}}' if math.isfinite(value) else ''

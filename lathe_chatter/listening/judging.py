@@ -1,0 +1,165 @@
+"""What the detector says of a recording over time, and how right that is by its labels."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.errors import SignalFileError, reason_of
+from lathe_chatter.listening.signal_file import Signals
+
+_BLOCK = 0.02
+"""s of samples that are judged at once."""
+_LATE = 0.5
+"""s within which a flag belongs to the chatter that began before it."""
+CHATTER = 'chatter'
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Estimates over time, one for each block of samples."""
+
+    estimates: tuple[Estimate, ...]
+
+    @property
+    def times(self) -> Array:
+        """Of the estimates, s (n,)."""
+        return np.array([each.time for each in self.estimates])
+
+    @property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Whether chatter is flagged (n,)."""
+        return np.array([each.chatter for each in self.estimates], bool)
+
+    def changes(self) -> list[Estimate]:
+        """The first estimate of every state, in order."""
+        found: list[Estimate] = []
+        for each in self.estimates:
+            if math.isfinite(each.time) and (not found or found[-1].state != each.state):
+                found.append(each)
+        return found
+
+
+def judge(
+    signals: Signals,
+    detector: ChatterDetector,
+    progress: Callable[[float], object] = lambda _seconds: None,
+) -> Judged:
+    """Let a detector listen to a recording.
+
+    Args:
+        signals: The recording.
+        detector: That has heard nothing yet.
+        progress: Is told how many more seconds have been judged.
+
+    Raises:
+        LayoutError: If there is nothing in it that can be listened to.
+    """
+    count = max(1, round(_BLOCK * signals.rate))
+    found = []
+    for begin in range(0, len(signals.samples), count):
+        block = signals.samples[begin : begin + count]
+        found.append(detector.update(block, signals.columns))
+        progress(len(block) / signals.rate)
+    return Judged(tuple(found))
+
+
+class Label(NamedTuple):
+    """What was the case from one time to another, s."""
+
+    start: float
+    end: float
+    state: str
+
+
+def read_labels(path: Path) -> list[Label]:
+    """Read a CSV of rows `start,end,state`; a first line of names is passed over.
+
+    Raises:
+        SignalFileError: If it is none.
+    """
+    found = []
+    try:
+        with path.open(encoding='utf-8', newline='') as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except (OSError, ValueError, csv.Error) as error:
+        raise SignalFileError(f'{path} cannot be read: {reason_of(error)}.') from None
+    for number, row in enumerate(rows, 1):
+        try:
+            label = Label(float(row[0]), float(row[1]), row[2].strip())
+        except (IndexError, ValueError):
+            if number == 1:
+                continue
+            raise SignalFileError(
+                f'{path}, row {number} is {",".join(row)}: it must be start (s), end (s), state.'
+            ) from None
+        if not label.start < label.end:
+            raise SignalFileError(
+                f'{path}, row {number}: {label.start:g} s is not before its end.'
+            )
+        found.append(label)
+    return found
+
+
+@dataclass(frozen=True)
+class Score:
+    """How right the flag was.
+
+    Attributes:
+        f1: Of the labelled seconds: harmonic mean of what part of the flagged was chatter, and
+            what part of the chatter was flagged; nan without chatter.
+        seconds: That are labelled.
+        events: Stretches of chatter.
+        found: Of them that were flagged.
+        delay: From the beginning of such a stretch to its flag, median, s.
+        false_alarms: Flags that rose outside of chatter.
+        quiet_hours: Labelled hours without chatter, against which they count.
+    """
+
+    f1: float
+    seconds: float
+    events: int
+    found: int
+    delay: float
+    false_alarms: int
+    quiet_hours: float
+
+
+def score(judged: Judged, labels: Sequence[Label]) -> Score:
+    """Hold the flag against labels; what has no label does not count."""
+    times, flagged = judged.times, judged.flagged
+    known = np.isfinite(times)
+    times, flagged = times[known], flagged[known]
+    labelled, chatter = np.zeros(len(times), bool), np.zeros(len(times), bool)
+    delays, events = [], [label for label in labels if label.state == CHATTER]
+    for label in labels:
+        inside = (times > label.start) & (times <= label.end)
+        labelled |= inside
+        if label.state == CHATTER:
+            chatter |= inside
+            raised = times[inside & flagged]
+            if len(raised):
+                delays.append(float(raised[0]) - label.start)
+    right = int(np.sum(flagged & chatter))
+    wrong = int(np.sum((flagged != chatter) & labelled))
+    rises = np.flatnonzero(flagged & ~np.r_[False, flagged[:-1]])
+    near = [any(label.start <= times[k] <= label.end + _LATE for label in events) for k in rises]
+    period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return Score(
+        2 * right / (2 * right + wrong) if events else math.nan,
+        float(labelled.sum()) * period,
+        len(events),
+        len(delays),
+        float(np.median(delays)) if delays else math.nan,
+        int(np.sum(labelled[rises] & ~np.array(near, bool))) if len(rises) else 0,
+        float((labelled & ~chatter).sum()) * period / 3600.0,
+    )

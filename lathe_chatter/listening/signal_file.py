@@ -1,0 +1,142 @@
+"""Recordings of sensors as shops keep them: WAV, CSV, MAT, Parquet, and recorded runs."""
+
+from __future__ import annotations
+
+import csv
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.errors import LatheChatterError, SignalFileError, optional, reason_of
+from lathe_chatter.recording import read_run
+
+_TIME = 'time'
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What sensors measured.
+
+    Attributes:
+        columns: Labels, `time` the first of them.
+        samples: In the units of `samples.columns.UNITS`, sound in any (n, columns).
+        source: The file, for people.
+    """
+
+    columns: tuple[str, ...]
+    samples: Array = field(repr=False)
+    source: str = ''
+
+    @property
+    def rate(self) -> float:
+        """Samples a second, Hz."""
+        return float(1.0 / np.median(np.diff(self.samples[:, 0])))
+
+
+def read_signals(
+    path: Path | str, *, columns: Sequence[str] | None = None, rate: float | None = None
+) -> Signals:
+    """Read a recording.
+
+    Args:
+        path: A WAV, CSV (names in its first line, perhaps with `[unit]`), MAT or Parquet file,
+            or a recorded run.
+        columns: What its columns or channels are, in order; by default what they are called,
+            and `sound` for the one channel of a WAV.
+        rate: Samples a second, Hz, where it has no column `time`.
+
+    Raises:
+        SignalFileError: If it cannot be read, or has no time; the sentence says why.
+    """
+    path = Path(path)
+    readers = {'.wav': _wav, '.csv': _csv, '.mat': _mat, '.parquet': _parquet}
+    reader = _run if path.is_dir() else {**readers, '.mcap': _run}.get(path.suffix.lower())
+    if reader is None:
+        raise SignalFileError(
+            f'{path} is none of {", ".join(readers)}, .mcap or the folder of a run.'
+        )
+    try:
+        path.stat()  # SciPy says nothing of a file that is not there
+        signals = reader(path)
+    except LatheChatterError:
+        raise
+    except (OSError, ValueError, csv.Error, struct.error) as error:
+        reason = reason_of(error).rstrip('.')
+        raise SignalFileError(f'{path} cannot be read: {reason}.') from None
+    return _labelled(path, signals, columns, rate)
+
+
+def _labelled(
+    path: Path, signals: Mapping[str, Array], columns: Sequence[str] | None, rate: float | None
+) -> Signals:
+    names = list(signals)
+    if columns is not None:
+        measured = [name for name in names if name != _TIME or _TIME in columns]
+        if len(columns) != len(measured):
+            raise SignalFileError(
+                f'{path} has {len(measured)} columns ({", ".join(measured)}), '
+                f'and {len(columns)} names were given.'
+            )
+        signals = {
+            **({_TIME: signals[_TIME]} if _TIME in signals else {}),
+            **dict(zip(columns, (signals[name] for name in measured), strict=True)),
+        }
+    sizes = {len(values) for values in signals.values()}
+    if len(sizes) != 1 or sizes.pop() < 2:
+        raise SignalFileError(f'{path} does not hold columns of one length, of 2 samples or more.')
+    if _TIME not in signals:
+        if rate is None:
+            raise SignalFileError(f'{path} has no column time: give its sample rate, in Hz.')
+        count = len(next(iter(signals.values())))
+        signals = {_TIME: np.arange(count) / rate, **signals}
+    ordered = [_TIME, *(name for name in signals if name != _TIME)]
+    samples = np.column_stack([np.asarray(signals[name], np.float64) for name in ordered])
+    return Signals(tuple(ordered), samples, str(path))
+
+
+def _wav(path: Path) -> dict[str, Array]:
+    from scipy.io import wavfile
+
+    rate, data = wavfile.read(path)
+    scale = float(np.iinfo(data.dtype).max) if data.dtype.kind in 'iu' else 1.0
+    channels = np.asarray(data, np.float64).reshape(len(data), -1) / scale
+    names = (
+        ['sound'] if channels.shape[1] == 1 else [f'channel_{k}' for k in range(channels.shape[1])]
+    )
+    signals = dict(zip(names, channels.T, strict=True))
+    return {_TIME: np.arange(len(data)) / rate, **signals}
+
+
+def _csv(path: Path) -> dict[str, Array]:
+    with path.open(encoding='utf-8') as stream:
+        head = next(csv.reader(stream), [])
+        names = [name.partition('[')[0].strip() for name in head]
+        table = np.loadtxt(stream, delimiter=',', ndmin=2)
+    return dict(zip(names, table.T, strict=True))
+
+
+def _mat(path: Path) -> dict[str, Array]:
+    from scipy.io import loadmat
+
+    found: dict[str, Array] = {}
+    for name, value in loadmat(path).items():
+        if not name.startswith('__') and np.issubdtype(np.asarray(value).dtype, np.number):
+            values = np.asarray(value, np.float64).ravel()
+            if values.size > 1:
+                found[name] = values
+    return found
+
+
+def _parquet(path: Path) -> dict[str, Array]:
+    parquet: Any = optional('pyarrow.parquet', 'pyarrow')
+    table = parquet.read_table(path)
+    return {name: np.asarray(table[name]) for name in table.column_names}
+
+
+def _run(path: Path) -> dict[str, Array]:
+    return dict(read_run(path).samples().columns)

@@ -1,0 +1,113 @@
+"""The monitor over recordings of every form, and its score against labels."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import savemat, wavfile
+
+from lathe_chatter.cli.main import main
+from lathe_chatter.detection import Estimate
+from lathe_chatter.errors import SignalFileError
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.listening import Judged, read_signals, score
+from lathe_chatter.listening.judging import Label, read_labels
+from lathe_chatter.model import Cut
+
+
+@pytest.fixture(scope='module')
+def sound() -> Any:
+    """4 s of a stable cut and 3 s of chatter, 10 kHz: an acceleration of each body, mixed."""
+    quiet = Cut(depth_of_cut=0.0005, bearing_contact='none', force_noise=5e-4)
+    lathe = VirtualLathe(cut=quiet, accelerometers=True, seed=21)
+    before = lathe.advance(40_000)
+    lathe.retune(quiet.with_changes(depth_of_cut=0.0008))
+    samples = np.vstack([before, lathe.advance(30_000)])
+    mixed = samples[:, 8] + 0.6 * samples[:, 9]
+    return mixed / abs(mixed).max()
+
+
+def written(folder: Path, form: str, sound: Any) -> list[str]:
+    """A file of that form, and what to call `listen` with."""
+    time, path = np.arange(len(sound)) / 1e4, folder / f'shop.{form}'
+    if form == 'wav':
+        wavfile.write(path, 10_000, (32_000 * sound).astype(np.int16))
+    elif form == 'csv':
+        np.savetxt(
+            path,
+            np.column_stack([time, sound]),
+            delimiter=',',
+            header='time [s],sound',
+            comments='',
+        )
+    elif form == 'mat':
+        savemat(path, {'sound': sound})
+        return [str(path), '--rate', '10 kHz']
+    else:
+        parquet = pytest.importorskip('pyarrow.parquet')
+        table = pytest.importorskip('pyarrow').table({'time': time, 'sound': sound})
+        parquet.write_table(table, path)
+    return [str(path)]
+
+
+@pytest.mark.parametrize('form', ['wav', 'csv', 'mat', 'parquet'])
+def test_chatter_in_a_file_is_heard_and_scored(
+    form: str, sound: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels, picture = tmp_path / 'labels.csv', tmp_path / 'heard.png'
+    labels.write_text('start,end,state\n0,4,stable\n4.5,7,chatter\n')
+    options = ['--labels', str(labels), '--output', str(picture), '--json']
+    assert main(['listen', *written(tmp_path, form, sound), *options]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said['score']['found'] == said['score']['events'] == 1
+    assert said['score']['false_alarms'] == 0
+    assert said['score']['f1'] > 0.9
+    flagged = next(state for state in said['states'] if state['chatter'])
+    assert flagged['frequency'] == pytest.approx(134.0, abs=1.0)
+    assert flagged['growth_rate'] is None
+    assert picture.stat().st_size > 10_000
+
+
+def test_a_score_counts_what_it_says() -> None:
+    """By hand: flags 1-2 s (false) and 4.5-6 s of chatter from 4 to 6 s, in blocks of 0.1 s."""
+    times = np.arange(1, 81) / 10
+    flags = ((times > 1) & (times <= 2)) | ((times > 4.5) & (times <= 6))
+    judged = Judged(
+        tuple(Estimate(float(t), chatter=bool(f)) for t, f in zip(times, flags, strict=True))
+    )
+    found = score(judged, [Label(0, 4, 'stable'), Label(4, 6, 'chatter'), Label(6, 8, 'idle')])
+    assert found.f1 == pytest.approx(2 * 15 / (25 + 20))
+    assert (found.events, found.found, found.false_alarms) == (1, 1, 1)
+    assert found.delay == pytest.approx(0.6)
+    assert found.quiet_hours == pytest.approx(6 / 3600)
+
+
+@pytest.mark.parametrize(
+    ('name', 'text', 'said'),
+    [
+        ('a.csv', 'time,sound\n0,x\n', 'cannot be read'),
+        ('a.csv', 'sound\n1\n2\n3\n', 'no column time'),
+        ('a.wav', 'RIFF', 'cannot be read'),
+        ('a.txt', '', 'is none of'),
+        ('none.mat', None, 'No such file'),
+    ],
+)
+def test_what_cannot_be_listened_to_is_one_sentence(
+    name: str, text: str | None, said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(SignalFileError, match=said):
+        read_signals(path)
+
+
+def test_labels_that_are_none_name_their_row(tmp_path: Path) -> None:
+    path = tmp_path / 'labels.csv'
+    path.write_text('start,end,state\n0,1,stable\n2,1,chatter\n')
+    with pytest.raises(SignalFileError, match='row 3'):
+        read_labels(path)
