@@ -33,7 +33,7 @@ def configure(parser: ArgumentParser) -> None:
         '--columns', metavar='NAMES',
         help='what its columns or channels are, with commas: time, spindle_angle (rev), tool_ and '
         'workpiece_ displacement, velocity or acceleration (SI), sound, force (default: their '
-        'names in the file; the one channel of a WAV is sound)',
+        'names in the file; the first channel of a WAV is sound)',
     )  # fmt: skip
     parser.add_argument(
         '--rate', type=in_unit('Hz'), metavar='HZ', help='sample rate, where there are no times'

@@ -47,7 +47,7 @@ def read_signals(
         path: A WAV, CSV (names in its first line, perhaps with `[unit]`), MAT or Parquet file,
             or a recorded run.
         columns: What its columns or channels are, in order; by default what they are called,
-            and `sound` for the one channel of a WAV.
+            and `sound` for the first channel of a WAV.
         rate: Samples a second, Hz, where it has no column `time`.
 
     Raises:
@@ -105,9 +105,7 @@ def _wav(path: Path) -> dict[str, Array]:
     rate, data = wavfile.read(path)
     scale = float(np.iinfo(data.dtype).max) if data.dtype.kind in 'iu' else 1.0
     channels = np.asarray(data, np.float64).reshape(len(data), -1) / scale
-    names = (
-        ['sound'] if channels.shape[1] == 1 else [f'channel_{k}' for k in range(channels.shape[1])]
-    )
+    names = ['sound', *(f'channel_{k + 1}' for k in range(1, channels.shape[1]))]
     signals = dict(zip(names, channels.T, strict=True))
     return {_TIME: np.arange(len(data)) / rate, **signals}
 

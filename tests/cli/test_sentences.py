@@ -27,7 +27,16 @@ CLI = Path(__file__).resolve().parents[2] / 'lathe_chatter' / 'cli'
 SENTENCES: dict[str, tuple[str, ...]] = {
     # simulate
     r'\S+ s simulated in \S+ s, \d+ times real time: \d+ samples\.': (
-        *('quiet', 'chatter', 'fails', 'peace', 'unwanted', 'guarded', 'report ramp'),
+        *(
+            'quiet',
+            'chatter',
+            'fails',
+            'peace',
+            'unwanted',
+            'guarded',
+            'report ramp',
+            'report unsure',
+        ),
     ),
     r' *\d+\.\d\d s  (depth_of_cut|chatter flagged|advice: try)': ('chatter', 'unwanted'),
     r'Chatter was to be flagged, and it is otherwise\.': ('fails',),
@@ -37,11 +46,12 @@ SENTENCES: dict[str, tuple[str, ...]] = {
     r'The run ended at \S+ s: a displacement passed 1 m': ('guarded',),
     # report
     r'Pairs: frequency / Hz and growth rate': (
-        *('chatter', 'report', 'report gap', 'report late', 'report ramp'),
+        *('chatter', 'report', 'report gap', 'report late', 'report ramp', 'report unsure'),
     ),
     r'No figure of a monitor is in the record\.': (
-        *('report', 'report gap', 'report late', 'report ramp'),
+        *('report', 'report gap', 'report late', 'report ramp', 'report unsure'),
     ),
+    r'With the standard errors of its machine file \(': ('report unsure',),
     r'Samples are missing in 1 place, the longest from 0\.5\d* s to 0\.7\d* s: ': ('report gap',),
     r' *\d\.\d+ +advice: \d+ rev/min': ('chatter',),
     r' *5\.\d+ +record begins: ': ('report late',),
@@ -58,8 +68,17 @@ SENTENCES: dict[str, tuple[str, ...]] = {
     r'saved into ': ('recover', 'recover damaged'),
     r'\d+ samples in .*\.csv': ('export', 'export gap'),
     r'note   .*(missing|gap)': ('export gap',),
+    # listen
+    r'works with  both displacements and the machine are known': ('listen',),
+    r'flagged     0\.0% of the time': ('listen',),
+    r'labels      F1 of seconds none: no chatter in them, 0 of 0 events, delay none, 0 false ': (
+        'listen',
+    ),
+    # dataset
+    r'2 windows, 100\.0% of a stable cut\.': ('dataset',),
+    r'1 machines x 1 runs x 2 windows of ': ('dataset', 'dataset dry'),
     # charts
-    r'lowest limit, open: 0\.59\d\d mm (at|in every lobe from) ': (
+    r'lowest limit, open: 0\.596\d* mm (at|in every lobe from) ': (
         'lobes',
         'lobes without bearing',
     ),
@@ -144,6 +163,16 @@ duration: 1.5
 parameters: {spindle_acceleration: 3000.0}
 steps: [{at: 1.0, set: {spindle_speed_rpm: 3600}}]
 """
+UNSURE = """
+tool: {modes: [{frequency: 125 Hz, damping_ratio: 5 %, mass: 50 g, errors: {frequency: 2 %}}]}
+"""
+PLAN = """
+machines: 1
+runs: 1
+duration: 1 s
+cut: {depth_of_cut: 0.3 mm, bearing_contact: none}
+windows: {length: 0.5 s}
+"""
 STEP = 'steps: [{at: 0.3, set: {depth_of_cut: 0.001}}]\n'
 
 
@@ -162,6 +191,10 @@ def situations(folder: Path, runs: dict[str, Path]) -> Iterator[tuple[str, list[
     yield 'report gap', ['report', str(runs['gap'])]
     yield 'report late', ['report', str(runs['late'])]
     yield 'report ramp', simulated(folder / 'ramp', '--report', scenario=RAMP)
+    unsure = folder / 'unsure.yaml'
+    unsure.write_text(UNSURE)
+    machine = ('--machine', str(unsure), '--duration', '0.3')
+    yield 'report unsure', simulated(folder / 'u', *machine, '--report')
     yield 'verify', ['verify', str(runs['whole'])]
     yield 'verify gap', ['verify', str(runs['gap'])]
     yield 'verify again', ['verify', str(runs['whole']), '--resimulate']
@@ -172,6 +205,13 @@ def situations(folder: Path, runs: dict[str, Path]) -> Iterator[tuple[str, list[
     yield 'recover damaged', ['recover', str(runs['damaged']), '--output', str(folder / 'part')]
     yield 'export', ['export', str(runs['whole']), '--output', str(folder / 'whole.csv')]
     yield 'export gap', ['export', str(runs['gap']), '--output', str(folder / 'gap.csv')]
+    labels, plan = folder / 'labels.csv', folder / 'plan.yaml'
+    labels.write_text('0,2,stable\n')
+    machine = ('--machine', 'paper', '--labels', str(labels))
+    yield 'listen', ['listen', str(runs['whole']), *machine]
+    plan.write_text(PLAN)
+    yield 'dataset dry', ['dataset', str(plan), '--output', str(folder / 'dry'), '--dry-run']
+    yield 'dataset', ['dataset', str(plan), '--output', str(folder / 'data')]
     for name, options in (
         ('lobes', ()),
         ('lobes without bearing', ('--bearing-contact', 'none')),
