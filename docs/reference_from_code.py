@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import runpy
 from pathlib import Path
 
 import lathe_chatter
@@ -60,7 +59,6 @@ def write_reference(folder: Path) -> None:
     """Write every part that is made, anew."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / 'commands.md').write_text(_commands(), encoding='utf-8')
-    (folder / 'parameters.md').write_text(_parameters(), encoding='utf-8')
     (folder / 'python.md').write_text(_python(), encoding='utf-8')
 
 
@@ -71,15 +69,6 @@ def _commands() -> str:
     for verb in VERBS:
         text = verbs.choices[verb.NAME].format_help()  # type: ignore[index,call-overload]
         lines += [f'## {verb.NAME}', '', '```text', text.strip(), '```', '']
-    return '\n'.join(lines)
-
-
-def _parameters() -> str:
-    """The table of every node that has one."""
-    script = Path(__file__).resolve().parents[1] / 'scripts' / 'readme_tables'
-    lines = []
-    for node, table in runpy.run_path(str(script))['TABLES'].items():
-        lines += [f'## {node}', '', table.markdown(), '']
     return '\n'.join(lines)
 
 

@@ -57,6 +57,23 @@ def test_a_dump_fed_back_is_the_same_node(
         again.destroy_node()
 
 
+@pytest.mark.parametrize('name', NODES)
+def test_the_file_of_parameters_that_is_shipped_changes_nothing(
+    name: str, start: Callable[..., Any], bench: Bench, context: Context
+) -> None:
+    kind = NODES[name]
+    node = start(kind, **({'autostart': False} if kind is RecorderNode else {}))
+    usual = {**node.values, **({'autostart': True} if kind is RecorderNode else {})}
+    bench.executor.remove_node(node)
+    node.destroy_node()
+    file = Path(__file__).parents[2] / 'config' / 'parameters' / f'{name}.yaml'
+    again = kind(context=context, cli_args=['--ros-args', '--params-file', str(file)])
+    try:
+        assert again.values == usual
+    finally:
+        again.destroy_node()
+
+
 def test_a_text_that_is_a_number_is_one_at_run_time(
     start: Callable[..., Any], bench: Bench
 ) -> None:

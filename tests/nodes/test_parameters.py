@@ -162,16 +162,18 @@ def test_the_table_of_a_readme_has_every_row() -> None:
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def readme_tables(*arguments: str) -> int:
-    script = ROOT / 'scripts' / 'readme_tables'
+def parameter_tables(*arguments: str) -> int:
+    script = ROOT / 'scripts' / 'parameter_tables'
     return subprocess.run([sys.executable, script, *arguments], check=False).returncode
 
 
-def test_the_tables_of_the_readme_are_current(tmp_path: Path) -> None:
-    assert readme_tables('--check') == 0, 'run scripts/readme_tables'
-    old = (ROOT / 'README.md').read_text().replace('| `depth_of_cut` | 0.0005 |', '| `depth` | |')
-    copy = tmp_path / 'README.md'
-    copy.write_text(old)
-    assert readme_tables('--check', str(copy)) == 1
-    assert readme_tables(str(copy)) == 0
-    assert copy.read_text() == (ROOT / 'README.md').read_text()
+def test_what_is_made_of_the_tables_is_current(tmp_path: Path) -> None:
+    assert parameter_tables('--check') == 0, 'run scripts/parameter_tables'
+    page = tmp_path / 'docs' / 'reference' / 'nodes.md'
+    page.parent.mkdir(parents=True)
+    current = (ROOT / 'docs' / 'reference' / 'nodes.md').read_text()
+    page.write_text(current.replace('| `depth_of_cut` | 0.0005 |', '| `depth` | |'))
+    assert parameter_tables('--check', '--root', str(tmp_path)) == 1
+    assert parameter_tables('--root', str(tmp_path)) == 0
+    assert page.read_text() == current
+    assert parameter_tables('--check', '--root', str(tmp_path)) == 0

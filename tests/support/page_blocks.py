@@ -43,7 +43,7 @@ class Block:
 
 def pages() -> list[Path]:
     """Every page that has code."""
-    found = sorted((ROOT / 'docs').rglob('*.md'))
+    found = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
     return [page for page in found if not {'_made', '_build'} & {*page.parts} and blocks(page)]
 
 
