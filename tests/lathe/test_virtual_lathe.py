@@ -16,6 +16,8 @@ import pytest
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe import EventKind, VirtualLathe
+from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 
 _NOISY = Cut(3017.0, 0.8e-3, force_noise=0.05, sensor_noise=1e-7, runout=2e-6)
@@ -343,3 +345,32 @@ def test_a_wrong_number_of_samples_is_refused(samples: Any) -> None:
 def test_what_is_of_another_kind_is_refused(call: Callable[[], Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         call()
+
+
+def test_two_corners_of_the_surface_at_one_place_are_met_one_after_the_other() -> None:
+    """An event less than a millionth of a step before the grid leaves a second node there.
+
+    A lathe once stood still at such a pair for ever (force_noise 0.05, after 774 s).
+    """
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=0.001, bearing_contact='none'))
+    lathe.advance(8000)  # the tool leaves the cut in every vibration by now
+    state = lathe.snapshot()
+    pointer, head = (int(state.counts[k]) for k in (layout.POINTER, layout.HEAD))
+    corners = [
+        k
+        for k in range(pointer + 2, head - 1)
+        if state.nodes[k, surface.ORDER] <= surface.LAST_ORDER
+    ]
+    assert corners
+    doubled = state.copy()
+    place = corners[0]
+    nodes = np.insert(state.nodes, place + 1, state.nodes[place], axis=0)
+    nodes[place, surface.SLOPE_AFTER] = nodes[place, surface.SLOPE_BEFORE]
+    nodes[place, surface.CURVATURE_AFTER] = nodes[place, surface.CURVATURE_BEFORE]
+    nodes[place + 1, surface.SLOPE_BEFORE] = nodes[place, surface.SLOPE_AFTER]
+    nodes[place + 1, surface.CURVATURE_BEFORE] = nodes[place, surface.CURVATURE_AFTER]
+    doubled.nodes = nodes
+    doubled.counts[layout.HEAD] += 1
+    went_on = VirtualLathe.continued(doubled).advance(400)
+    usual = VirtualLathe.continued(state).advance(400)
+    assert went_on == pytest.approx(usual, rel=1e-6, abs=1e-12)

@@ -265,6 +265,8 @@ def take_step(
             numbers[layout.LEFT] = left if left > 0.5 * merge else 0.0
             for i in range(n2):
                 z[i] = end[i]
+        elif kind == layout.NO_EVENT:  # a second corner of the surface at the place met
+            _move_on(numbers, counts, nodes, settings, slope, node, at_node, ramp_ends, scratch)
         if kind == layout.NO_EVENT:
             continue
         moves = machine.moves[regime, after]

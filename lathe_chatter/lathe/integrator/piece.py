@@ -82,7 +82,7 @@ def plan_piece(
         node += 1
         if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
             place, ramp_ends, at_node = nodes[node, surface.PLACE], False, True
-            rise = place + turn - here
+            rise = max(place + turn - here, 0.0)  # two corners may be at one place
             duration = rise / base
             if not steady:
                 duration = time_to_turn(rise, base, slope, variation, phase, frequency)
