@@ -41,6 +41,7 @@ ARROWS = {
     'scenario': {'model', 'lathe', 'detection', 'recording'},
     'listening': {'detection', 'recording'},
     'dataset': {'model', 'samples', 'lathe', 'stability', 'scenario'},
+    'environment': {'model', 'samples', 'lathe', 'detection'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'page': {'model', 'samples', 'lathe', 'stability', 'recording', 'report'},
@@ -161,10 +162,11 @@ def in_a_fresh_interpreter(script: str, home: Path) -> str:
 
 
 IMPORT_ALL = """
-import importlib, pkgutil, lathe_chatter
+import contextlib, importlib, pkgutil, lathe_chatter.errors
 for found in pkgutil.walk_packages(lathe_chatter.__path__, 'lathe_chatter.'):
     if not found.name.endswith('__main__'):
-        importlib.import_module(found.name)
+        with contextlib.suppress(lathe_chatter.errors.MissingPackageError):  # an extra
+            importlib.import_module(found.name)
 import sys
 from numba.core.dispatcher import Dispatcher
 ours = [module for name, module in sys.modules.items() if name.startswith('lathe_chatter.')]

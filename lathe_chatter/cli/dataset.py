@@ -18,7 +18,7 @@ from lathe_chatter.executors import cores, width_of
 
 NAME = 'dataset'
 HELP = 'make labelled windows of simulated cuts on machines drawn by a plan'
-EXAMPLE = 'lathe-chatter dataset examples/chatter.yaml --output data/chatter'
+EXAMPLE = 'lathe-chatter dataset examples/datasets/chatter.yaml --output data/chatter'
 
 
 def configure(parser: ArgumentParser) -> None:

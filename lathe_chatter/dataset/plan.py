@@ -1,6 +1,6 @@
 """A plan: which machines, cuts, sensors and events a data set has, read from YAML.
 
-docs/datasets.md has every field.
+docs/how_to/datasets.md has every field.
 """
 
 from __future__ import annotations

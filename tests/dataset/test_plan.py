@@ -13,7 +13,7 @@ from lathe_chatter.errors import PlanError
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.stability import safe_limit
 
-EXAMPLE = Path(__file__).parents[2] / 'examples' / 'chatter.yaml'
+EXAMPLE = Path(__file__).parents[2] / 'examples' / 'datasets' / 'chatter.yaml'
 
 
 def written(folder: Path, text: str) -> Path:

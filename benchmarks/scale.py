@@ -1,0 +1,338 @@
+"""The figures of wide work: data sets, executors, truth, and the environment to learn in.
+
+    python benchmarks/scale.py [PART ...] [--windows N] [--workers N] [--plot FILE]
+
+Parts: truth windows hashes workers environment size (all by default; about three minutes on two
+idle cores with --windows 100000). Times are by the clock: they mean something on an idle machine
+only. --plot draws how time falls with workers: measured as far as --workers goes, and beyond that
+simulated, from the measured time of each batch and of what the one process that writes does.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+import argparse
+import hashlib
+import heapq
+import resource
+import shutil
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.cli.console import Screen
+from lathe_chatter.cli.executor_options import open_executor
+from lathe_chatter.dataset import Plan, load_plan, make_dataset, making
+from lathe_chatter.executors import Processes, cores, run_batches
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.sweep import LatheSweep
+from lathe_chatter.model import Cut, Machine, Mode
+from lathe_chatter.stability.operating_points import operating_points
+
+ROOT = Path(__file__).resolve().parents[1]
+_PER_MACHINE = 1000
+"""Windows of a machine: ten runs of a hundred."""
+_PLAN = """
+machines: {machines}
+runs: 10
+duration: 10.5 s
+machine:
+  tool.natural_frequency: {{uniform: [550 rad/s, 1100 rad/s]}}
+  workpiece.natural_frequency: {{uniform: [450 rad/s, 900 rad/s]}}
+  workpiece.damping_ratio: {{uniform: [0.03, 0.08]}}
+  cutting_coefficient: {{log_uniform: [2 MPa, 6 MPa]}}
+cut:
+  spindle_speed_rpm: {{uniform: [2000, 6000]}}
+  depth_of_cut: {{of_limit: {{uniform: [0.2, 1.4]}}}}
+  bearing_contact: {{choice: [none, seated]}}
+  force_noise: {{log_uniform: [0.0003, 0.003]}}
+  sensor_noise: 0.1 um
+windows: {{length: 0.1 s, first: 0.5 s}}
+"""
+
+
+def main() -> None:
+    """Measure what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
+    parser.add_argument('parts', nargs='*', metavar='PART')
+    parser.add_argument('--windows', type=int, default=100_000, help='of the data set (100000)')
+    parser.add_argument('--workers', type=int, default=cores(), help='(a core each)')
+    parser.add_argument('--plot', metavar='FILE', help='draw how time falls with workers')
+    options = parser.parse_args()
+    parts: dict[str, Callable[[Any], None]] = {
+        'truth': truth,
+        'windows': windows,
+        'hashes': hashes,
+        'workers': workers,
+        'environment': environment,
+        'size': size,
+    }
+    unknown = set(options.parts) - set(parts)
+    if unknown:
+        parser.error(f'no such part: {", ".join(unknown)}; there are {", ".join(parts)}')
+    Screen().compile()
+    for name in options.parts or parts:
+        parts[name](options)
+    if options.plot:
+        plot(options)
+
+
+def show(what: str, value: str, goal: str = '') -> None:
+    """A line of the table."""
+    print(f'{what:72} {value:>16}  {goal and f"goal {goal}"}', flush=True)
+
+
+def truth(_options: Any) -> None:
+    """Of machines that are all different."""
+    rng = np.random.default_rng(1)
+    machines = [
+        Machine(Mode(0.05, rng.uniform(550.0, 1100.0), 0.05), Mode(0.05, 650.0, 0.05))
+        for _ in range(5000)
+    ]
+    speeds = rng.uniform(2000.0, 6000.0, 5000).tolist()
+    cuts = [Cut(speed, 5e-4) for speed in speeds]
+    operating_points(machines[:2], cuts[:2])
+    begin = time.perf_counter()
+    operating_points(machines, cuts)
+    spent = (time.perf_counter() - begin) / len(machines)
+    show('truth of a random machine, among 5000', f'{1e3 * spent:.3f} ms', '0.1 ms')
+
+
+def plan_of(count: int, folder: Path) -> Plan:
+    """A plan of about so many windows, a third of a cut that chatters."""
+    path = folder / 'plan.yaml'
+    path.write_text(_PLAN.format(machines=max(2, count // _PER_MACHINE)), encoding='utf-8')
+    return load_plan(path)
+
+
+def windows(options: Any) -> None:
+    """A data set, its time and its memory."""
+    with tempfile.TemporaryDirectory() as name, Processes(options.workers) as pool:
+        plan, folder = plan_of(options.windows, Path(name)), Path(name) / 'data'
+        warm(plan, pool)
+        begin = time.perf_counter()
+        entries = make_dataset(plan, folder, executor=pool)
+        spent = time.perf_counter() - begin
+        stable = sum(entry['stable'] for entry in entries) / plan.windows
+        written = sum(file.stat().st_size for file in folder.rglob('*') if file.is_file())
+    what = (
+        f'{plan.windows} windows of 2 x 1000, {1 - stable:.0%} unstable, {options.workers} workers'
+    )
+    show(what, f'{spent:.0f} s', f'{300 * plan.windows / 1e6:.0f} s')
+    show('  a window', f'{1e3 * spent * options.workers / plan.windows:.2f} ms of a core')
+    show('  on disk', f'{written / 1e6:.0f} MB')
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    theirs = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * options.workers
+    show(
+        '  memory at most: this process and its workers', f'{(own + theirs) / 1e3:.0f} MB', '1 GB'
+    )
+
+
+def warm(plan: Plan, pool: Executor) -> None:
+    """Have the workers load what they load once."""
+    one = [making.Part('', range(1))]
+    list(run_batches(partial(making.make_part, plan), [one] * (2 * cores()), executor=pool))
+
+
+def digest(folder: Path) -> str:
+    """Of every file of a folder."""
+    found = hashlib.sha256()
+    for file in sorted(file for file in folder.rglob('*') if file.is_file()):
+        found.update(file.relative_to(folder).as_posix().encode() + file.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def hashes(_options: Any) -> None:
+    """The same bytes from everybody, also where one is killed or the call is interrupted."""
+    kinds: dict[str, Callable[[], Any]] = {
+        '1 thread': partial(ThreadPoolExecutor, 1),
+        '2 threads': partial(ThreadPoolExecutor, 2),
+        '4 threads': partial(ThreadPoolExecutor, 4),
+        '1 process': partial(Processes, 1),
+        '2 processes': partial(Processes, 2),
+        '4 processes': partial(Processes, 4),
+        'Dask, 2 workers': partial(open_executor, 2, 'local'),
+    }
+    found = {}
+    with tempfile.TemporaryDirectory() as name:
+        plan = plan_of(8000, Path(name))
+        for kind, open_ in kinds.items():
+            with open_() as pool:
+                make_dataset(plan, Path(name) / kind, executor=pool)
+            found[kind] = digest(Path(name) / kind)
+            shutil.rmtree(Path(name) / kind)
+
+        def interrupt(done: int, total: int) -> None:
+            if done > 0.4 * total:
+                raise KeyboardInterrupt
+
+        with Processes(2) as pool:
+            try:
+                make_dataset(plan, Path(name) / 'again', executor=pool, progress=interrupt)
+            except KeyboardInterrupt:
+                make_dataset(plan, Path(name) / 'again', executor=pool)
+        found['interrupted and continued'] = digest(Path(name) / 'again')
+    for kind, value in found.items():
+        show(f'data set of {plan.windows} windows: {kind}', value)
+    equal = 'equal' if len(set(found.values())) == 1 else 'DIFFERENT'
+    show('hashes', equal, 'equal')
+
+
+def lathes(count: int) -> LatheSweep:
+    """Lathes of many speeds."""
+    cuts = [Cut(speed, 6e-4, force_noise=1e-3) for speed in np.linspace(2000.0, 6000.0, count)]
+    return LatheSweep(VirtualLathe(cut=cut, seed=k) for k, cut in enumerate(cuts))
+
+
+def workers(options: Any) -> None:
+    """Dask against one thread, and where a worker is killed at 40 % of the time."""
+    count, samples = 400, 100_000
+    sweeps = {}
+
+    def swept(pool: Executor) -> float:
+        sweep = lathes(count)
+        begin = time.perf_counter()
+        sweeps[id(sweep)] = sweep.advance(samples, columns=['tool_displacement'], executor=pool)
+        return time.perf_counter() - begin
+
+    lathes(1).advance(1000)
+    with ThreadPoolExecutor(1) as pool:
+        alone = swept(pool)
+    show(f'{count} lathes x {samples} samples: 1 thread', f'{alone:.1f} s')
+    kinds = {
+        'Dask': partial(open_executor, options.workers, 'local'),
+        'processes': partial(Processes, options.workers),
+        'threads': partial(ThreadPoolExecutor, options.workers),
+    }
+    for kind, open_ in kinds.items():
+        with open_() as pool:
+            list(run_batches(_processor_id, [[0]] * 8, executor=pool))  # they are there
+            whole = swept(pool)
+            show(f'  {options.workers} {kind}', f'{alone / whole:.2f} times', '1.8 for 2 of Dask')
+            if kind == 'threads':
+                continue
+            done = run_batches(_processor_id, [[0]] * 8, executor=pool)
+            victim = next(done).results[0]
+            threading.Timer(0.4 * whole, os.kill, (victim, signal.SIGKILL)).start()
+            killed = swept(pool)
+            show(f'  {kind}: a worker killed at 40 %', f'{killed / whole:.2f} times', '1.4')
+    first, *others = (values.tobytes() for values in sweeps.values())
+    show('  bits', 'equal' if all(first == other for other in others) else 'DIFFERENT', 'equal')
+
+
+def _processor_id(_item: int) -> int:
+    return os.getpid()
+
+
+def environment(_options: Any) -> None:
+    """Steps of 20 ms, where the setting is held and where it is another each time."""
+    from lathe_chatter.environment import LatheEnv
+
+    env = LatheEnv(steps=10**9)
+    for what, count, moves in (
+        ('held', 20_000, np.zeros(16)),
+        ('one of 16', 20_000, np.linspace(-1.0, 1.0, 16)),
+        ('never the same', 500, np.linspace(-1.0, 1.0, 190)),
+    ):
+        env.reset(seed=1)
+        actions = np.column_stack((moves, np.full(len(moves), -0.5), np.zeros(len(moves))))
+        for k in range(20):
+            env.step(actions[k % len(actions)])
+        begin = time.perf_counter()
+        for k in range(count):
+            env.step(actions[k % len(actions)])
+        rate = count / (time.perf_counter() - begin)
+        goal = '10000' if what == 'held' else ''
+        show(f'environment, steps of 20 ms: the setting is {what}', f'{rate:.0f} /s', goal)
+
+
+def size(_options: Any) -> None:
+    """Lines of Python."""
+    package = ROOT / 'lathe_chatter'
+    for what, files, goal in (
+        ('executors', [package / 'executors.py'], '200'),
+        ('data sets', sorted((package / 'dataset').glob('*.py')), '500'),
+        ('environment', [package / 'environment.py'], '100'),
+    ):
+        lines = [line for file in files for line in file.read_text(encoding='utf-8').split('\n')]
+        show(f'lines of {what}', f'{len(lines)}', goal)
+
+
+def simulated(batches: Array, serial: float, count: int) -> float:
+    """The time, s, in which some workers do batches that one process takes from them and writes."""
+    free, taken = [0.0] * count, 0.0
+    for length in batches:
+        ready = heapq.heappop(free) + length
+        taken = max(taken, ready) + serial
+        heapq.heappush(free, ready)
+    return taken
+
+
+def plot(options: Any) -> None:
+    """Draw time over workers."""
+    from lathe_chatter.plot_style import OPEN, SEATED, grid, new_figure, save
+
+    with tempfile.TemporaryDirectory() as name:
+        plan = plan_of(40_000, Path(name))
+        task = partial(making.make_part, plan)
+        parts = making.parts_of(plan)
+        task(parts[0])
+        begin, lengths, serial = time.perf_counter(), [], 0.0
+        for part in parts:
+            files, entry = task(part)
+            lengths.append(time.perf_counter() - begin)
+            begin = time.perf_counter()
+            making._write(Path(name) / entry['part'], files)  # noqa: SLF001 -- what it takes
+            serial += (time.perf_counter() - begin) / len(parts)
+            begin = time.perf_counter()
+        measured = {}
+        for count in range(1, options.workers + 1):
+            with Processes(count) as pool:
+                warm(plan, pool)
+                begin = time.perf_counter()
+                make_dataset(plan, Path(name) / str(count), executor=pool)
+                measured[count] = time.perf_counter() - begin
+    # The million windows of the table, in batches that take as long as these did.
+    million = round(1e6 / plan.windows * len(parts))
+    batches = np.random.default_rng(1).choice(lengths, million)
+    counts = np.unique(np.geomspace(1, 1024, 31).round().astype(int))
+    times = np.array([simulated(batches, serial, int(count)) for count in counts])
+    figure = new_figure(7.0, 4.6)
+    axes = figure.subplots()
+    scale = 1e6 / plan.windows / 60.0
+    axes.loglog(counts, times / 60.0, '-', color=OPEN, label='simulated, from measured batches')
+    axes.loglog(counts, times[0] / 60.0 / counts, ':', color='0.5', label='ideal')
+    axes.loglog(
+        [*measured], [scale * value for value in measured.values()], 'o', color=SEATED, ms=8,
+        label='measured (40 000 windows, times 25)',
+    )  # fmt: skip
+    axes.set_xlabel('workers')
+    axes.set_ylabel('time of a million windows / min')
+    axes.legend()
+    grid(axes)
+    save(figure, Path(options.plot))
+    for count in (1, 2, 8, 64, 512):
+        spent = simulated(batches, serial, count)
+        show(f'a million windows, simulated, {count} workers', f'{spent / 60.0:.1f} min')
+    for count, value in measured.items():
+        show(
+            f'a million windows, measured on {plan.windows}, {count} workers',
+            f'{scale * value:.1f} min',
+        )
+    show('what the one process does for a batch', f'{1e3 * serial:.1f} ms')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,31 @@
+"""The README's two lines, small: a data set, and a forest that is tested on machines held out."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('sklearn')
+pytest.importorskip('pyarrow')
+
+EXAMPLE = Path(__file__).parents[2] / 'examples' / 'datasets'
+
+
+def test_a_forest_is_right_about_machines_that_it_has_never_seen(tmp_path: Path) -> None:
+    text = (EXAMPLE / 'chatter.yaml').read_text(encoding='utf-8')
+    small = text.replace('machines: 150', 'machines: 60')
+    assert small != text
+    (tmp_path / 'small.yaml').write_text(small, encoding='utf-8')
+    make = [sys.executable, '-m', 'lathe_chatter.cli', 'dataset', 'small.yaml', '--output', 'data']
+    learn = [sys.executable, str(EXAMPLE / 'learn_chatter.py'), 'data']
+    made = subprocess.run(make, cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert '3600 windows, ' in made.stdout
+    done = subprocess.run(learn, cwd=tmp_path, check=True, capture_output=True, text=True)
+    first, second = done.stdout.splitlines()
+    assert first == '2520 windows to learn from, 1080 of other machines:'
+    right, _, constant = second.partition('% right, where always the same answer would be ')
+    assert float(right) >= 95.0
+    assert float(constant.rstrip('%')) < 70.0
