@@ -271,7 +271,7 @@ def size(_options: Any) -> None:
 
 
 def simulated(batches: Array, serial: float, count: int) -> float:
-    """The time, s, in which some workers do batches that one process takes from them and writes."""
+    """The time, s, in which workers do batches that one process takes from them and writes."""
     free, taken = [0.0] * count, 0.0
     for length in batches:
         ready = heapq.heappop(free) + length
