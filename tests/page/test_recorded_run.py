@@ -132,8 +132,10 @@ def served(run: Path) -> Iterator[str]:
     command = [sys.executable, '-u', '-m', 'lathe_chatter.cli', 'page', str(run)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    line = process.stdout.readline()
-    found = re.search(r'http://\S+', line + process.stdout.readline() if line else '')
+    said = ''  # one line, or two where the terminal is narrow
+    while 'http://' not in said and (line := process.stdout.readline()):
+        said += line
+    found = re.search(r'http://\S+', said)
     assert found, process.stderr.read() if process.stderr else ''
     yield found[0]
     process.send_signal(signal.SIGINT)
