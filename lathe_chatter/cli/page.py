@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 from argparse import ArgumentParser, Namespace
 from contextlib import suppress
 
@@ -37,6 +38,10 @@ def run(options: Namespace) -> int:
     open_in_browser(server.url)
 
     async def serve() -> None:
+        loop = asyncio.get_running_loop()
+        for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(each) != signal.SIG_IGN:
+                loop.add_signal_handler(each, server.end)
         reading = asyncio.create_task(shown.read())
         await server.run()
         reading.cancel()

@@ -265,8 +265,8 @@ def _without(*dropped: str) -> tuple[list[int], tuple[str, ...]]:
 _LESS: dict[str, tuple[tuple[str, ...], bool]] = {
     'FULL': ((), True),
     'NO_MACHINE': ((), False),
-    'ONE_SENSOR': (('workpiece_displacement',), True),
-    'NO_SPINDLE': (('spindle_angle', 'workpiece_displacement'), False),
+    'ONE_SENSOR': (('workpiece_displacement', 'workpiece_velocity'), True),
+    'NO_SPINDLE': (('spindle_angle', 'workpiece_displacement', 'workpiece_velocity'), False),
 }
 
 

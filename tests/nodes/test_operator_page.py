@@ -157,7 +157,7 @@ def test_pause_step_knock_and_recording(page: Page, browser: Browser) -> None:
     browser.until('document.querySelector("[data-call=pause]")', 'to go on')
     browser.click('#knock')
     browser.until('document.querySelector("#log").innerText.includes("knock of 0.002 N s")', 'it')
-    browser.enter('#impulse', '1e9')
+    browser.enter('#impulse', '1e12')
     browser.click('#knock')
     browser.until('document.querySelector("#notice").textContent.includes("impulse is")', 'no')
     browser.click('[data-call=record_snapshot]')

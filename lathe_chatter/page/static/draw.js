@@ -101,6 +101,13 @@ function number(value, digits = 3) {
 }
 
 // Axes for what is drawn by hand over them.
+// Five decades below the highest value; a usual range while there is none, for an axis without end
+// never stops dividing itself.
+function logarithmic(high) {
+  const top = Number.isFinite(high) && high > 1e-6 ? high * 2 : 1e-3;
+  return [top / 2e5, top];
+}
+
 function canvas(id, axes, ranges, hand) {
   plot(id, id, () => ({
     height: 210, axes, legend: {show: false},
@@ -177,7 +184,7 @@ function drawSpectrum(amplitudes, step, speed, chatter) {
   const y = Array.from(amplitudes, v => Math.max(v * MICRO, 1e-7));
   plot('spectrum', 'spectrum', () => ({
     height: 220, legend: {show: false},
-    scales: {x: {time: false}, y: {distr: 3, range: (u, low, high) => [Math.max(high / 1e5, 1e-7), high * 2]}},
+    scales: {x: {time: false}, y: {distr: 3, range: (u, low, high) => logarithmic(high)}},
     axes: [axis('frequency / Hz'), axis('amplitude / µm', {side: 3, values: (u, list) => list.map(v => (v && Number.isInteger(Math.log10(v)) ? v.toExponential(0) : ''))})],
     series: [{}, {stroke: () => css('tool'), width: 1, points: {show: false}}],
     hooks: {draw: [u => {
