@@ -277,8 +277,12 @@ class LatheState:
         if ratio == 1.0 and feeds[0] == feeds[1]:
             return
         place, ahead = numbers[layout.PLACE], numbers[layout.AHEAD]
-        used = self.nodes[: int(counts[layout.HEAD]) + 1]
+        # What the tool has met is forgotten here too: places that begin anew with each change
+        # would else never become so large that it is.
+        pointer = int(counts[layout.POINTER])
+        used = self.nodes[pointer : int(counts[layout.HEAD]) + 1]
         self.nodes[: len(used)] = surface.recounted(used, place, ratio, ahead, feeds)
+        counts[layout.POINTER], counts[layout.HEAD] = 0, len(used) - 1
         met: Array = np.zeros((1, surface.NODE_SIZE))
         met[0, surface.PLACE] = place - old[layout.TURN]
         met[0, surface.HEIGHT] = numbers[layout.HEIGHT]

@@ -237,6 +237,19 @@ def _anything(_: VirtualLathe, k: int) -> Cut:
     )  # fmt: skip
 
 
+def test_memory_does_not_grow_with_changes_of_speed() -> None:
+    """As a controller makes them, some a turn; and no bit depends on what was forgotten when."""
+    lathe = VirtualLathe(cut=Cut(3000.0, 0.6e-3))
+    other = VirtualLathe(cut=Cut(3000.0, 0.6e-3))
+    for k in range(300):
+        cut = lathe.cut.with_changes(spindle_speed_rpm=2500.0 + 100.0 * (k % 11))
+        lathe.retune(cut)
+        other = VirtualLathe.continued(other.snapshot())  # which forgets everything that it can
+        other.retune(cut)
+        assert lathe.advance(150).tobytes() == other.advance(150).tobytes()
+    assert len(lathe.snapshot().nodes) <= len(lathe._state.nodes) < 2500
+
+
 @pytest.mark.parametrize('change', [_jumping, _flipping, _anything])
 @pytest.mark.parametrize('samples', [1, 10, 100])
 @pytest.mark.parametrize('acceleration', [0.0, 1e6])
