@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from support.browser import Browser, chromium
 from support.node_processes import NodeProcesses
@@ -168,6 +169,21 @@ def test_pause_step_knock_and_recording(page: Page, browser: Browser) -> None:
     browser.click('[data-call=record_stop]')
     browser.until('document.querySelector("#recording").textContent.includes("not rec")', 'an end')
     assert (page.folder / 'run' / 'metadata.yaml').exists()
+
+
+def test_a_spectrum_of_any_height_is_drawn(browser: Browser) -> None:
+    """uPlot never ends dividing a logarithmic axis that begins at some values, as at 9.6e-12."""
+    heights = [*np.geomspace(0.95e-6, 1.02e-6, 60), *np.geomspace(1e-12, 1e6, 80), 0.0]
+    drawn = browser.run(
+        f'(async () => {{ const drawn = []; for (const top of {json.dumps(heights)}'
+        '.concat([NaN, Infinity])) {'
+        'drawSpectrum(Float32Array.from([0, top, top / 2]), 1, 3000, null);'
+        'await null; const {min, max} = plots.get("spectrum").scales.y; drawn.push([min, max]); }'
+        'return drawn; })()'
+    )
+    assert len(drawn) == len(heights) + 2
+    assert all(0 < low < high <= low * 1e6 for low, high in drawn)
+    assert browser.complaints == []
 
 
 def test_a_foreign_page_is_kept_out(page: Page, browser: Browser, tmp_path: Path) -> None:

@@ -101,11 +101,11 @@ function number(value, digits = 3) {
 }
 
 // Axes for what is drawn by hand over them.
-// Five decades below the highest value; a usual range while there is none, for an axis without end
-// never stops dividing itself.
+// Five to six decades, from a power of ten: uPlot divides an axis from 9.6e-12 without end, and one
+// whose end is not finite too; a usual range while nothing is known.
 function logarithmic(high) {
   const top = Number.isFinite(high) && high > 1e-6 ? high * 2 : 1e-3;
-  return [top / 2e5, top];
+  return [Number(`1e${Math.floor(Math.log10(top)) - 5}`), top];
 }
 
 function canvas(id, axes, ranges, hand) {
