@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from types import TracebackType
+from contextlib import AbstractContextManager
 from typing import IO, NamedTuple
 
 from lathe_chatter.errors import NodeFailedError
@@ -33,7 +33,7 @@ def _die_with_parent() -> None:
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGTERM)
 
 
-class ProcessGroup:
+class ProcessGroup(AbstractContextManager['ProcessGroup']):
     """Processes of nodes; as a context it ends them all, the last started last.
 
     They are in sessions of their own, so that Ctrl-C reaches this process alone, which then
@@ -97,16 +97,7 @@ class ProcessGroup:
             output.close()
         return complaints
 
-    def __enter__(self) -> ProcessGroup:  # noqa: PYI034 -- Self needs Python 3.11
-        """Nothing runs yet."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """End what still runs."""
         self.end()
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from lathe_chatter.arrays import Array
@@ -36,7 +36,7 @@ _COMMIT_PERIOD = 0.1
 _SECOND = 10**9
 
 
-class LatheRun:
+class LatheRun(AbstractContextManager['LatheRun']):
     """Records one lathe: samples, parameters, and the sentences of what happens to the cut.
 
     What it leaves is read, verified, resimulated and reported as a run of the recorder is. As a
@@ -148,16 +148,7 @@ class LatheRun:
         self._closed = True
         self.writer.abandon()
 
-    def __enter__(self) -> LatheRun:  # noqa: PYI034 -- Self needs Python 3.11
-        """It is there."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         """Close; after an exception the run says that it ended early."""
         if error is None:
             self.close()

@@ -6,8 +6,8 @@ import math
 import os
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 
 from lathe_chatter.errors import DiskFullError, RunExistsError
 from lathe_chatter.recording.counts_on_disk import UnfinishedCounts
@@ -23,7 +23,7 @@ _CHUNK_SIZE = 1 << 22
 """Larger than what comes between two commits, which each end a chunk."""
 
 
-class RunWriter:
+class RunWriter(AbstractContextManager['RunWriter']):
     """Writes a run: topics and their messages, in files that split without a gap.
 
     Nothing is on disk before a commit; ask for one every 0.25 s or so. Messages are gathered
@@ -185,16 +185,7 @@ class RunWriter:
         self._thread.end()
         self._counts.close(finished=False)
 
-    def __enter__(self) -> RunWriter:  # noqa: PYI034 -- Self needs Python 3.11
-        """The folder and its first file are there."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close, also after an exception: what was recorded before it counts."""
         self.close()
 
