@@ -67,8 +67,8 @@ def _commands() -> str:
     lines = []
     verbs = next(action for action in parser()._actions if action.dest == 'verb')  # noqa: SLF001
     for verb in VERBS:
-        text = verbs.choices[verb.NAME].format_help()  # type: ignore[index,call-overload]
-        lines += [f'## {verb.NAME}', '', '```text', text.strip(), '```', '']
+        text = verbs.choices[verb].format_help()  # type: ignore[index,call-overload]
+        lines += [f'## {verb}', '', '```text', text.strip(), '```', '']
     return '\n'.join(lines)
 
 

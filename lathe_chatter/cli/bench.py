@@ -28,8 +28,6 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
-NAME = 'bench'
-HELP = 'print the performance figures of this package on this machine'
 EXAMPLE = 'lathe-chatter bench lathe stability'
 
 _MOST = 1000

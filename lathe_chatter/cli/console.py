@@ -35,7 +35,6 @@ from rich.table import Table
 from rich.text import Text
 
 from lathe_chatter.errors import OutputError, reason_of
-from lathe_chatter.precompile import precompile
 
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
@@ -133,6 +132,8 @@ class Screen:
 
     def compile(self) -> None:
         """Compile the inner loops, or load what is compiled."""
+        from lathe_chatter.precompile import precompile  # with all that can be compiled
+
         precompile(say=self.say)
 
     @contextmanager

@@ -16,8 +16,6 @@ from lathe_chatter.dataset.making import Part, make_part, parts_of
 from lathe_chatter.errors import DatasetError
 from lathe_chatter.executors import cores, width_of
 
-NAME = 'dataset'
-HELP = 'make labelled windows of simulated cuts on machines drawn by a plan'
 EXAMPLE = 'lathe-chatter dataset examples/datasets/chatter.yaml --output data/chatter'
 
 

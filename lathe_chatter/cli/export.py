@@ -19,8 +19,6 @@ from lathe_chatter.recording.export import (
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.recording.unrolled_export import unroll
 
-NAME = 'export'
-HELP = 'write the samples of a recorded run as CSV, Parquet, MAT, HDF5, or a message per sample'
 EXAMPLE = 'lathe-chatter export runs/20260401-120000 --columns tool_displacement --start 3'
 
 _FILES = {'csv': to_csv, 'parquet': to_parquet, 'mat': to_mat, 'hdf5': to_hdf5}

@@ -21,8 +21,6 @@ from lathe_chatter.model.uncertainty import Uncertainty
 from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.tap_test import ModalFit, fit_modes, read_frequency_responses
 
-NAME = 'identify'
-HELP = 'make a machine file from tap tests: the modes of tool and workpiece, and how sure they are'
 EXAMPLE = 'lathe-chatter identify tool=tool.uff workpiece=shaft.csv --output machine.yaml'
 
 _BODIES = ('tool', 'workpiece')

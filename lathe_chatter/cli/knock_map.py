@@ -20,8 +20,6 @@ from lathe_chatter.model.quantities import limits_of
 from lathe_chatter.plot_style import files_of_picture, text_of
 from lathe_chatter.stability import contact_at
 
-NAME = 'knock-map'
-HELP = 'simulate which knock turns a stable cut into lasting chatter, over speed and depth'
 EXAMPLE = 'lathe-chatter knock-map --speeds 2000:6000:33 --depths 0.0004:0.001:25'
 
 _AXES = (

@@ -19,8 +19,6 @@ from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.plot_style import files_of_picture
 
-NAME = 'listen'
-HELP = 'have the monitor judge a recording: WAV, CSV, MAT, Parquet, or a recorded run'
 EXAMPLE = 'lathe-chatter listen shop.wav --band 500:1500 --labels shop.csv --output heard.png'
 
 _FREQUENCY = Quantity('a frequency', 'Hz', high=1e6, exclusive=True)

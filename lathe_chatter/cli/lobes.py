@@ -42,8 +42,6 @@ from lathe_chatter.report.stability_chart import (
 from lathe_chatter.stability import GrowthMap, SafeLimit, SpeedLaw, growth_map, lowest_limit
 from lathe_chatter.stability.probability import StabilityProbability, stability_probability
 
-NAME = 'lobes'
-HELP = 'draw the stability chart: both limits, the seating line and the safe region'
 EXAMPLE = 'lathe-chatter lobes --bearing-clearance 1e-5 --map --csv lobes.csv'
 
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')

@@ -50,7 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(each, end)
         from lathe_chatter.cli.verbs import BEGINNING, parser
 
-        options, unknown = parser().parse_known_args(arguments)
+        words = sys.argv[1:] if arguments is None else arguments
+        asked = os.environ.get('COMP_LINE', '') if '_ARGCOMPLETE' in os.environ else ''
+        options, unknown = parser(asked.split() or words).parse_known_args(words)
         if unknown:  # argparse itself would show how to give a verb, not its options
             options.usage_of.unknown(unknown)
         if options.verb is None:

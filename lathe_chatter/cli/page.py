@@ -12,8 +12,6 @@ from lathe_chatter.cli.console import Screen
 from lathe_chatter.page.recorded_run import RecordedRun
 from lathe_chatter.page.server import PageServer, open_in_browser
 
-NAME = 'page'
-HELP = 'show a recorded run in the browser: scrub, zoom to a sample, the path over the chart'
 EXAMPLE = 'lathe-chatter page runs/20260401-120000'
 
 

@@ -9,8 +9,6 @@ from lathe_chatter.cli.common_options import add_json, add_run, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import recover
 
-NAME = 'recover'
-HELP = 'save every whole part of a damaged run into a new one; the old one is only read'
 EXAMPLE = 'lathe-chatter recover runs/damaged --output runs/saved'
 
 

@@ -21,8 +21,6 @@ from lathe_chatter.paper.page import OVERVIEWS, PAGE, write_page
 from lathe_chatter.paper.summary_pictures import draw_conditions, draw_findings, draw_growth
 from lathe_chatter.plot_style import files_of_picture
 
-NAME = 'reproduce'
-HELP = "reproduce the paper's 14 runs: verdicts, exact roots, measured growth rates, figures"
 EXAMPLE = 'lathe-chatter reproduce --output reproduction'
 
 FIGURES = 'reproduction.json'

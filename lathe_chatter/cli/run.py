@@ -9,9 +9,10 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, scenario_help, utf8, verdict
+from lathe_chatter.cli.common_options import add_json, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
+from lathe_chatter.cli.scenario_options import scenario_help, verdict
 from lathe_chatter.errors import RunFailedError, RunReadError
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.model.parameters import MACHINE_FILE
@@ -27,8 +28,6 @@ from lathe_chatter.scenario import (
 )
 from lathe_chatter.supervisor import Mode
 
-NAME = 'run'
-HELP = 'start lathe, monitor and recorder, play a scenario, and leave the recorded run'
 EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
 
 

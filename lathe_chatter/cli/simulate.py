@@ -7,10 +7,11 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, in_unit, scenario_help, utf8, verdict
+from lathe_chatter.cli.common_options import add_json, in_unit, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
+from lathe_chatter.cli.scenario_options import scenario_help, verdict
 from lathe_chatter.errors import ParameterError, ScenarioError
 from lathe_chatter.lathe.cut_events import Knock
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
@@ -26,8 +27,6 @@ from lathe_chatter.scenario import (
 )
 from lathe_chatter.scenario.simulation import Simulated, needs_monitor, simulate
 
-NAME = 'simulate'
-HELP = 'simulate a cut without ROS, as fast as possible, and record it'
 EXAMPLE = 'lathe-chatter simulate --depth-of-cut 0.001 --duration 20 --output runs/deep'
 
 _DURATION = Quantity('simulated time', 's', high=86400.0, exclusive=True)

@@ -1,68 +1,39 @@
 """The verbs of the command line, one module each, and the parser of them all.
 
-A verb has NAME, HELP, EXAMPLE, configure(parser) and run(options) -> exit code.
+A verb is a module of its name with EXAMPLE, configure(parser) and run(options) -> exit code. Only
+the one that is called is imported: some need libraries that take seconds to load.
 """
 
 from __future__ import annotations
 
 import os
-from argparse import Action, ArgumentError, ArgumentParser, Namespace
+from argparse import Action, ArgumentError, ArgumentParser
 from collections.abc import Sequence
-from typing import Any, NoReturn, Protocol
+from importlib import import_module
+from typing import Any, NoReturn
 
 from lathe_chatter import __version__
-from lathe_chatter.cli import (
-    bench,
-    dataset,
-    export,
-    identify,
-    knock_map,
-    listen,
-    lobes,
-    page,
-    recover,
-    report,
-    reproduce,
-    run,
-    simulate,
-    verify,
-)
 from lathe_chatter.errors import nearest_name
 
 _USER_ERROR = 2
 
-
-class Verb(Protocol):
-    """What a module of this package offers."""
-
-    NAME: str
-    HELP: str
-    EXAMPLE: str
-
-    def configure(self, parser: ArgumentParser) -> None:
-        """Declare arguments and options."""
-
-    def run(self, options: Namespace) -> int:
-        """Do it and return the exit code."""
-
-
-VERBS: tuple[Verb, ...] = (
-    run,
-    simulate,
-    report,
-    page,
-    reproduce,
-    lobes,
-    knock_map,
-    identify,
-    listen,
-    dataset,
-    verify,
-    recover,
-    export,
-    bench,
-)
-
+VERBS = {
+    'run': 'start lathe, monitor and recorder, play a scenario, and leave the recorded run',
+    'simulate': 'simulate a cut without ROS, as fast as possible, and record it',
+    'report': 'print what happened in a recorded run and draw it',
+    'page': 'show a recorded run in the browser: scrub, zoom to a sample, the path over the chart',
+    'reproduce': "reproduce the paper's 14 runs: verdicts, exact roots, growth rates, figures",
+    'lobes': 'draw the stability chart: both limits, the seating line and the safe region',
+    'knock-map': 'map the knock that turns a stable cut into lasting chatter',
+    'identify': 'make a machine file from tap tests: the modes, and how sure they are',
+    'listen': 'have the monitor judge a recording: WAV, CSV, MAT, Parquet, or a recorded run',
+    'dataset': 'make labelled windows of simulated cuts on machines drawn by a plan',
+    'verify': 'prove a run complete and unaltered, or say what is wrong (exit 1; 3: unproven)',
+    'recover': 'save every whole part of a damaged run into a new one; the old one is only read',
+    'export': 'write the samples of a run as CSV, Parquet, MAT, HDF5, or a message per sample',
+    'bench': 'print the performance figures of this package on this machine',
+}
+"""What each does, in the order in which they are shown."""
 
 BEGINNING = """\
 A virtual lathe with bearing clearance. To begin with:
@@ -102,8 +73,9 @@ class Parser(ArgumentParser):
         self.error(f'unrecognized arguments: {" ".join(words)}{hint}')
 
 
-def parser() -> Parser:
-    """The command line with every verb."""
+def parser(words: Sequence[str] | None = None) -> Parser:
+    """The command line, with the options of its first verb; without words those of every verb."""
+    called = VERBS if words is None else [word for word in words if word in VERBS][:1]
     result = Parser(
         prog='lathe-chatter',
         description='A virtual lathe with bearing clearance: run it, record it, look into it.',
@@ -111,15 +83,13 @@ def parser() -> Parser:
     result.add_argument('--version', action='version', version=f'lathe-chatter {__version__}')
     result.set_defaults(usage_of=result)
     verbs = result.add_subparsers(dest='verb', metavar='VERB')
-    for verb in VERBS:
-        entry = verbs.add_parser(
-            verb.NAME,
-            help=verb.HELP,
-            description=verb.HELP,
-            epilog=f'example: {verb.EXAMPLE}',
-        )
-        verb.configure(entry)
-        entry.set_defaults(run=verb.run, usage_of=entry)
+    for name, meaning in VERBS.items():
+        entry = verbs.add_parser(name, help=meaning, description=meaning)
+        if name in called:
+            verb = import_module(f'{__package__}.{name.replace("-", "_")}')
+            verb.configure(entry)
+            entry.epilog = f'example: {verb.EXAMPLE}'
+            entry.set_defaults(run=verb.run, usage_of=entry)
     if '_ARGCOMPLETE' in os.environ:  # a shell asks what may come next
         import argcomplete
 

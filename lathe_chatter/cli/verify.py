@@ -17,10 +17,6 @@ from lathe_chatter.recording import (
 )
 from lathe_chatter.recording.resimulate import finding_of
 
-NAME = 'verify'
-HELP = (
-    'prove a recorded run complete and unaltered, or say what is wrong (exit code 1; 3: unproven)'
-)
 _NOT_PROVEN = 3
 """Exit code where nothing is wrong, and the samples can be neither confirmed nor denied."""
 EXAMPLE = 'lathe-chatter verify runs/20260401-120000 --resimulate'

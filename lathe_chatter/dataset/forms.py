@@ -16,8 +16,6 @@ from lathe_chatter.dataset.windows import Table
 from lathe_chatter.errors import optional
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.lathe.cut_events import Knock
-from lathe_chatter.scenario import Scenario, Step
-from lathe_chatter.scenario.simulation import simulate
 
 ENDINGS = {Form.PARQUET: '.parquet', Form.HDF5: '.h5', Form.ZARR: '.zarr', Form.MCAP: '_runs'}
 Files = dict[str, bytes]
@@ -74,6 +72,9 @@ def _zarr(folder: Path, table: Table) -> None:
 
 def _runs(folder: Path, table: Table, runs: list[DrawnRun], duration: float) -> None:
     """Whole runs, as `lathe-chatter simulate` leaves them, and the truth of their windows."""
+    from lathe_chatter.scenario import Scenario, Step
+    from lathe_chatter.scenario.simulation import simulate
+
     for run in runs:
         config, rate = LatheConfig(run.setup, run.cuts[0]), run.setup.sample_rate
         steps = [
