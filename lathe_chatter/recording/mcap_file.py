@@ -7,6 +7,7 @@ import struct
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -33,6 +34,7 @@ from lathe_chatter.recording.mcap_reader import (
 )
 from lathe_chatter.recording.mcap_summary import Summary, add_record, body_is_sound, read_summary
 from lathe_chatter.recording.provenance import CHECK, OURS, checked
+from lathe_chatter.recording.writer_lock import is_held
 
 _RECORD = struct.Struct('<BQ')
 _LOOSE_AT_ONCE = 1 << 20
@@ -86,7 +88,7 @@ class Raw(NamedTuple):
 
 
 class RecordedFile:
-    """A file that is walked when it is asked.
+    """A file that is walked when it is asked: as it was when it was opened, whoever writes it.
 
     Args:
         path: Of the file.
@@ -94,6 +96,7 @@ class RecordedFile:
 
     Attributes:
         has_end: Whether it ends as a sound file does.
+        being_written: Whether its writer was still at it when this was made.
         known: Schemas and channels, as far as they have been met, and what the summary has.
         unproven: Whether messages were handed out that no CRC covers.
     """
@@ -102,6 +105,7 @@ class RecordedFile:
         """Read the end of the file, where schemas and channels mostly stand together."""
         self.path = path
         self.on_damage = on_damage
+        self.being_written = is_held(path)
         summary = read_summary(path)
         self.has_end = summary is not None
         self.known = summary or Summary(0)
@@ -110,6 +114,7 @@ class RecordedFile:
         self._proofs: list[bool | None] = []
         self._data_end = 0
         self._told = False
+        self._walk = partial(scan, path, end=self.known.data_end)
 
     def topics(self) -> dict[str, str]:
         """The type of each topic by name; empty for one without a schema.
@@ -168,7 +173,7 @@ class RecordedFile:
         """
         met: Counter[int] = Counter()
         damaged = False
-        for found in scan(self.path, chunks=chunks):
+        for found in self._walk(chunks=chunks):
             damaged = damaged or isinstance(found, Damage)
             met[found.opcode if isinstance(found, Plain) else Opcode.CHUNK] += 1
             yield found
@@ -279,10 +284,13 @@ class RecordedFile:
             OSError: If the file cannot be read.
         """
         if not self._proofs:
-            plain = (found for found in scan(self.path, chunks=False) if isinstance(found, Plain))
-            end = next((found for found in plain if found.opcode == Opcode.DATA_END), None)
-            (expected,) = struct.unpack('<I', end.content) if end else (0,)
-            self._data_end = end.offset - _RECORD.size if end else self.path.stat().st_size
+            expected, end = self.known.data_crc, self.known.data_end
+            if end is None:  # a damaged summary
+                plain = (each for each in self._walk(chunks=False) if isinstance(each, Plain))
+                last = next((each for each in plain if each.opcode == Opcode.DATA_END), None)
+                (expected,) = struct.unpack('<I', last.content) if last else (0,)
+                end = last.offset - _RECORD.size if last else self.path.stat().st_size
+            self._data_end = end
             sound = body_is_sound(self.path, self._data_end, expected) if expected else None
             self._proofs.append(sound)
         return self._proofs[0]
@@ -299,7 +307,7 @@ class RecordedFile:
 
     def contradictions(self) -> Iterator[str]:
         """Where the summary says what is not so, as phrases."""
-        heads = [f for f in scan(self.path, chunks=False) if isinstance(f, ChunkHead)]
+        heads = [f for f in self._walk(chunks=False) if isinstance(f, ChunkHead)]
         places = {place.offset for place in self.known.chunks}
         if places and places != {head.offset for head in heads}:
             yield 'its index does not lead to all of its chunks, and to nothing else'

@@ -105,19 +105,20 @@ class _BadChunkError(Exception):
 Found = Chunk | ChunkHead | Plain | Damage
 
 
-def scan(file: Path, *, chunks: bool = True) -> Iterator[Found]:
+def scan(file: Path, *, chunks: bool = True, end: int | None = None) -> Iterator[Found]:
     """Walk the data section of a file, to the record that ends it.
 
     Args:
         file: MCAP.
         chunks: Whether these are read, and not passed by.
+        end: Where the data end, if that is known.
 
     Raises:
         OSError: If the file cannot be read.
     """
     descriptor = os.open(file, os.O_RDONLY)
     try:
-        yield from _Walk(file, descriptor, chunks=chunks).run()
+        yield from _Walk(file, descriptor, chunks=chunks, end=end).run()
     finally:
         os.close(descriptor)
 
@@ -183,10 +184,13 @@ def _indexes_in(data: memoryview) -> dict[int, bytes]:
 
 
 class _Walk:
-    def __init__(self, file: Path, descriptor: int, *, chunks: bool) -> None:
+    def __init__(
+        self, file: Path, descriptor: int, *, chunks: bool, end: int | None = None
+    ) -> None:
         self._file = file
         self._descriptor = descriptor
-        self._size = os.fstat(descriptor).st_size
+        self._end = end
+        self._size = os.fstat(descriptor).st_size if end is None else end
         self._chunks = chunks
         self._sound = 0  # up to here nothing is in doubt
 
@@ -195,7 +199,7 @@ class _Walk:
         position = len(MCAP0_MAGIC)
         if self._read(0, position) != MCAP0_MAGIC:
             yield Damage(self._file, 0, position, 'this is not the beginning of an MCAP file')
-        while True:
+        while position != self._end:
             found = self._head(position)
             if found is None and position >= self._size:
                 yield Damage(self._file, self._size, self._size, 'the end of the file is missing')

@@ -41,7 +41,9 @@ from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.disk_thread import FileSync
 from lathe_chatter.recording.mcap_chunk import ClosedChunk, Compression, OpenChunk, record_bytes
+from lathe_chatter.recording.mcap_summary import OUR_LIBRARY
 from lathe_chatter.recording.provenance import sealed
+from lathe_chatter.recording.writer_lock import hold
 
 _DATA_END_SIZE, _END_SIZE = 13, 37
 """Bytes of the record that ends the data, and of footer and magic."""
@@ -96,6 +98,7 @@ class CommittedFile:
         """Make the file and commit its empty beginning."""
         self._compression = compression
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+        hold(self._descriptor)
         self._sync = FileSync(self._descriptor)
         self._schemas: list[bytes] = []
         self._channels: list[bytes] = []
@@ -103,7 +106,7 @@ class CommittedFile:
         self._other_indexes = bytearray()
         self._attachments = self._metadata = 0
         self._body = bytearray(MCAP0_MAGIC)
-        self._body += record_bytes(Header(profile='ros2', library='lathe_chatter'))
+        self._body += record_bytes(Header(profile='ros2', library=OUR_LIBRARY))
         self._body_start = self._crc = 0
         self._contents = self.committed = Contents()
         self._tail = b''

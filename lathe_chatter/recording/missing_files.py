@@ -16,6 +16,8 @@ from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.split_files import CLOSED
 from lathe_chatter.recording.verification_result import Verification
 
+_STILL = 'The run is still being recorded: this is what is on disk of it.'
+
 
 def check_files(found: Verification) -> None:
     """Every file to its last byte, and that none is missing."""
@@ -78,6 +80,8 @@ def lost_at_the_end(
     counts = taken(run.path) if run.folder else {}
     notes = run.notes()
     ours = (run.path / UNFINISHED).exists() or any(note.name == IDENTITY for note in notes)
+    if any(file.being_written for file in run.opened):
+        return [_STILL]
     ends = [note.values for note in notes if note.name == CLOSED]
     if not ours or (len(ends) >= len(run.files) and not ends[-1].get('next')):
         return []
@@ -109,6 +113,8 @@ def check_order(found: Verification) -> None:
         name = following.name if following else ''
         if not nexts or nexts[-1] == name or nexts[-1] in found.missing:
             continue
+        if nexts[-1] and not following and (path.parent / nexts[-1]).exists():
+            continue  # it was begun since
         if nexts[-1] and not following:
             found.add_loss(f'{nexts[-1]} is missing, in which the run went on.')
         else:
