@@ -1,5 +1,5 @@
 # Two commands are all there is to know: `make run` and `make test`. Both install what they need.
-.PHONY: help run page test test-core test-kilted lint docs everywhere bounds lock clean
+.PHONY: help run page test test-core test-kilted lint docs figures everywhere bounds lock clean
 .DEFAULT_GOAL := help
 
 # Nodes of this checkout talk on this machine only, unless the user has said otherwise.
@@ -17,6 +17,7 @@ help:
 	@echo 'make test  every test (make test ARGS="tests/recording -x" for some)'
 	@echo 'make lint  style and types'
 	@echo 'make docs  the documentation as a site: docs/_build/html/index.html'
+	@echo 'make figures  the pictures of the documentation and of the paper, anew'
 	@echo 'make test-core    the tests that do not talk to ROS'
 	@echo 'make test-kilted  what talks to ROS, on the wheels of ROS 2 Kilted instead of Jazzy'
 	@echo 'make everywhere   run and test as other users would: each Python, other folders and rights'
@@ -39,6 +40,9 @@ docs:
 	@python=$$(scripts/environment docs) \
 	  && "$$python" -m sphinx -W --keep-going -q -b html docs docs/_build/html $(ARGS) \
 	  && echo 'docs/_build/html/index.html'
+
+figures:
+	@scripts/figures $(ARGS)
 
 test:
 	@python=$$(scripts/environment jazzy test) && "$$python" -m lathe_chatter.precompile \

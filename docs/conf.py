@@ -9,7 +9,11 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(HERE.parent))
 
+import ziamath  # draws formulas without LaTeX, with a font of its own
+from docutils import nodes
 from reference_from_code import write_reference
+from sphinx.application import Sphinx
+from sphinx.writers.html5 import HTML5Translator
 
 import lathe_chatter
 
@@ -24,8 +28,11 @@ extensions = [
     'sphinx.ext.napoleon',  # docstrings in Google's style
     'sphinx_gallery.gen_gallery',  # examples/*.py with their pictures
 ]
+html_math_renderer = 'drawn'
 html_theme = 'sphinx_rtd_theme'  # the one of the ROS 2 documentation
 html_title = f'lathe_chatter {release}'
+html_static_path = ['_static']
+html_css_files = ['site.css']
 exclude_patterns = ['_build', 'reference/_made', '**/README.*', 'auto_examples/*.ipynb']
 suppress_warnings = ['config.cache']  # the gallery's sorting is a function
 
@@ -52,3 +59,24 @@ sphinx_gallery_conf = {
 }
 
 write_reference(HERE / 'reference' / '_made')
+
+
+def write_formula(translator: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
+    """Write a formula as a drawing in the page, which needs no script or font from elsewhere."""
+    source, _, number = node.astext().partition(r'\tag{')
+    name = translator.attval(source)
+    formula = ziamath.Latex(source.strip())
+    drawing = formula.svg().replace('<svg ', f'<svg role="img" aria-label="{name}" ', 1)
+    if isinstance(node, nodes.math_block):
+        number = number and f'<span class="eqno">({number.partition("}")[0]})</span>'
+        translator.body.append(f'<div class="math">{number}{drawing}</div>')
+    else:
+        below = formula.getyofst()
+        translator.body.append(f'<span style="vertical-align: {below:.1f}px">{drawing}</span>')
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Add what no extension has."""
+    ziamath.config.math.fontsize = 17
+    app.add_html_math_renderer('drawn', (write_formula, None), (write_formula, None))
