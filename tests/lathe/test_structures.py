@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from support.reference import dop853
 from support.reference.solution import Event, event_error
 
@@ -278,6 +279,42 @@ def test_the_textbooks_limit_of_one_mode() -> None:
     cut = Cut(60.0 * chatter / turns, limit, bearing_contact='none')
     assert _growth(machine, cut.with_changes(depth_of_cut=limit * 1.02)) > 0.0
     assert _growth(machine, cut.with_changes(depth_of_cut=limit * 0.98)) < 0.0
+
+
+def test_process_damping_follows_the_surface_speed() -> None:
+    """C_pd w r'/V on a ramp and while the speed varies, as DOP853 has it where C is 0."""
+    machine = Machine(cutting_coefficient=0.0)
+    start = Cut(2000.0, 1e-3, bearing_contact='none', process_damping=2e4)
+    start = start.with_changes(speed_variation_amplitude=0.3, speed_variation_frequency=5.0)
+    lathe = VirtualLathe(
+        machine, start, tool_leaves_cut=False, accelerometers=True, spindle_acceleration=2e4,
+        initial_state=(1e-5, 0.0, -2e-5, 0.01),
+    )  # fmt: skip
+    lathe.retune(start.with_changes(spindle_speed_rpm=4000.0))
+    samples = lathe.advance(2000)
+
+    def accelerations(t: float, y: Array) -> tuple[float, float]:
+        swing = 1.0 + 0.3 * math.sin(2.0 * math.pi * 5.0 * t)
+        rpm = min(2000.0 + 2e4 * t, 4000.0) * swing
+        surface_speed = math.pi * start.workpiece_diameter * rpm / 60.0
+        force = start.process_damping * start.depth_of_cut / surface_speed * (y[1] - y[3])
+        tool, workpiece = machine.tool, machine.workpiece
+        return (
+            -(force + tool.damping * y[1] + tool.stiffness * y[0]) / tool.mass,
+            (force - workpiece.damping * y[3] - workpiece.stiffness * y[2]) / workpiece.mass,
+        )
+
+    def slope(t: float, y: Array) -> list[float]:
+        of_tool, of_workpiece = accelerations(t, y)
+        return [y[1], of_tool, y[3], of_workpiece]
+
+    solved = solve_ivp(
+        slope, (0.0, 0.2), (1e-5, 0.0, -2e-5, 0.01), 'DOP853', samples[:, 0], rtol=1e-12,
+        atol=1e-18, max_step=1e-3,
+    )  # fmt: skip
+    assert _error(samples[:, 2:6], solved.y.T) < 1e-8
+    expected = [accelerations(t, y) for t, y in zip(samples[:, 0], solved.y.T, strict=True)]
+    assert samples[:, 8:] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize('varied', [False, True])

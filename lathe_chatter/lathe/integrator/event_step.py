@@ -174,7 +174,7 @@ def take_step(
         if begins or counts[layout.CORNER] > 0 or counts[layout.SURFACE_CORNER] > 0:
             more = damping * (1.0 / speed - 1.0) * numbers[layout.RELATIVE_RATE] if varies else 0.0
             bend = bend_of(
-                z, machine.outputs[regime], direct, piece[at.MET_0], on_tool, between - more, f0
+                z, machine.outputs[regime], direct, piece[at.MET_0], on_tool, between + more, f0
             )
             finish_corner(numbers, counts, nodes, settings, bend, speed, acceleration)
         node, at_node, ramp_ends = plan_piece(numbers, counts, nodes, settings, slope, left, piece)
@@ -257,7 +257,7 @@ def take_step(
         if piece[at.DURATION] > 0.0:
             more = extra * (seen[TOOL_V] - seen[WORKPIECE_V])
             bend = bend_of(
-                end, machine.outputs[regime], direct, piece[at.MET_1], on_tool, between - more, f1
+                end, machine.outputs[regime], direct, piece[at.MET_1], on_tool, between + more, f1
             )
             _leave_surface(counts, nodes, settings, bend, scratch)
             _move_on(numbers, counts, nodes, settings, slope, node, at_node, ramp_ends, scratch)

@@ -3,7 +3,7 @@
 Within a piece neither contact nor cutting changes, so the machine is linear: in its coordinates,
 measured from the rest of the regime,
 
-    z' = generator z + b_u U(t) + b_t f_t + b_c [f_c - delta(t) r'] + b_w f_w(t)
+    z' = generator z + b_u U(t) + b_t f_t + b_c [f_c + delta(t) r'] + b_w f_w(t)
 
 with the surface U that the tool meets, forces f_t on the tool and f_c between tool and workpiece
 that are held for a sample, the force f_w of an unbalance on the workpiece, and by how much the
@@ -134,7 +134,7 @@ def solve_piece(
                 if k >= 2:
                     damped += forces[5] * k * (k - 1.0) * work[4, 2 * n + k - 2]
                 for i in range(2 * n):
-                    work[4, i] -= rules[BY_CUTTING_FORCE, i] * (duration * damped)
+                    work[4, i] += rules[BY_CUTTING_FORCE, i] * (duration * damped)
         for i in range(2 * n):
             work[3, i] = work[4, i]
             series[k + 1, i] = work[4, i] * INVERSE_FACTORIAL[k + 1]

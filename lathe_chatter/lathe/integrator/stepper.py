@@ -137,7 +137,7 @@ def _take_any_step(
             turning, _, _ = unbalance_force(settings, out[row, 1], speed, acceleration, 0.0)
         write_accelerations(
             out, row, z, machine.rules[regime], machine.direct[regime], met, on_tool,
-            between - more, turning,
+            between + more, turning,
         )  # fmt: skip
     return 1, found, layout.FINISHED
 
