@@ -205,7 +205,7 @@ def _lost(run: Path, nodes: Nodes) -> int:
     """How many samples a run lacks; that its recorder counted as many, if it could finish."""
     if not run.exists() or not any(run.iterdir()):
         return 0
-    verify(run)
+    found = verify(run)
     opened = read_run(run)
     if '/lathe/samples' not in set(opened.topics):
         return 0
@@ -217,6 +217,10 @@ def _lost(run: Path, nodes: Nodes) -> int:
         counted = json.loads(notes[SUMMARY]['samples'])['/lathe/samples']['lost']
         if counted != missing:
             nodes.faults.append(f'{run.name}: {missing} samples are missing, {counted} were told')
+        # A recorder that stood still for too long may lose messages of others as well.
+        told = [each.text for each in found.findings if each.loss]
+        if not missing and told:
+            nodes.faults.append(f'{run.name}: nothing is missing, and verify says: {told}')
     elif run in nodes.finished:
         nodes.faults.append(f'{run.name}: finished, and says nothing at its end')
     return missing

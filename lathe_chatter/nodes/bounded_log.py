@@ -93,6 +93,11 @@ class BoundedLog:
         for kind in self._kinds.values():
             self._log_held_back(kind)
 
+    def end(self) -> None:
+        """Tell what is still held back: nobody will look any more."""
+        for kind in self._kinds.values():
+            self._log_held(kind)
+
     def _take(self, severity: LoggingSeverity, sentence: str, name: str) -> None:
         if name not in self._kinds and len(self._kinds) >= MAX_KINDS:
             name = ''
@@ -107,12 +112,14 @@ class BoundedLog:
 
     def _log_held_back(self, kind: _Kind) -> None:
         """Begin a new period, if one is over, with what the old one held back."""
-        now = self._now()
-        if now - kind.since < PERIOD:
-            return
+        if self._now() - kind.since >= PERIOD:
+            # A kind that goes on is logged once a period, not once a burst.
+            kind.logged = BURST if kind.held else 0
+            self._log_held(kind)
+            kind.since = self._now()
+
+    def _log_held(self, kind: _Kind) -> None:
         if kind.held:
-            more = f' ({kind.held} of this kind in {now - kind.since:.0f} s.)'
+            more = f' ({kind.held} of this kind in {self._now() - kind.since:.0f} s.)'
             self._log(kind.severity, kind.last + (more if kind.held > 1 else ''))
-        # A kind that goes on is logged once a period, not once a burst.
-        kind.logged = BURST if kind.held else 0
-        kind.since, kind.held = now, 0
+        kind.held = 0

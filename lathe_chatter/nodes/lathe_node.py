@@ -245,10 +245,10 @@ class LatheNode(ParameterNode):
         self._diagnostics.publish(self._statuses())
 
     def finish(self) -> None:
-        """Finish its own record."""
-        record: LatheRecord | None = getattr(self, '_record', None)
-        if record is not None:  # Kilted destroys nodes, too, that were refused half-made
-            record.close()
+        """Say what is still to be said, and finish its own record."""
+        if hasattr(self, '_log'):  # Kilted destroys nodes, too, that were refused half-made
+            self._record.close()
+            self._log.end()
 
     # -- the cut ---------------------------------------------------------------------------
 

@@ -233,6 +233,10 @@ class MonitorNode(ParameterNode):
         speeds = float(self.values['slowest_speed']), float(self.values['fastest_speed'])  # type: ignore[arg-type]  # numbers
         return ChatterDetector(self.machine, speed_range=speeds)
 
+    def finish(self) -> None:
+        """Say what is still to be said."""
+        self._log.end()
+
     # -- what is said ----------------------------------------------------------------------
 
     def _say(self, kind: str, text: str) -> None:

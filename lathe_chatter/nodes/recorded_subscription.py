@@ -72,6 +72,7 @@ class RecordedTopic:
         self._node = node
         self._write = write
         self._class = message_class
+        self._met = len(offers)
         self._subscribe(_matching(offers))
 
     @property
@@ -89,9 +90,16 @@ class RecordedTopic:
         kinds = {offer.topic_type for offer in offers}
         return not kinds or self.topic.type in kinds
 
-    def look(self, offers: list[TopicEndpointInfo]) -> None:
-        """Follow the graph: new publishers may offer less than those before."""
-        self.numbering.settle(len(offers), time.monotonic())
+    def look(self, offers: list[TopicEndpointInfo], met: int) -> None:
+        """Follow the graph: new publishers may offer less than those before.
+
+        Args:
+            offers: Of those that publish its type now.
+            met: How many publishers the topic has had so far, those that went included: what one
+                of them had sent before it was heard is no loss of another.
+        """
+        self._met = met
+        self.numbering.settle(met, time.monotonic())
         wanted = _matching(offers) if offers else self._qos
         if _asks_less(wanted, self._qos):
             self.take()
@@ -101,7 +109,7 @@ class RecordedTopic:
     def end(self) -> None:
         """Take what has arrived and was not yet served, and unsubscribe."""
         self.take()
-        self.numbering.settle(self._node.count_publishers(self.topic.name), math.inf)
+        self.numbering.settle(self._met, math.inf)
         self._subscription.end()
 
     def _subscribe(self, qos: QoSProfile) -> None:

@@ -30,15 +30,14 @@ from lathe_chatter.recording.provenance import (
     PARAMETERS,
     PAUSES,
     RECEPTION,
-    STALLS,
     identity,
     parameter_values,
 )
 from lathe_chatter.recording.receive_stalls import ReceiveStalls
+from lathe_chatter.recording.ros_messages import LOG_TYPE
 from lathe_chatter.recording.run_events import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.snapshot import SnapshotBuffer
-from lathe_chatter.samples.continuity import BlockOrder
 
 _COMMIT_PERIOD = 0.2
 """s between two commits: with the time that one takes it is what a kill can lose."""
@@ -48,6 +47,8 @@ _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
 _NEWS_PERIOD = 10.0
 """s after what was said of missing samples until more is."""
+_ECHO = 0.5
+"""s within which what it says last has come back to it, as it records its own log too."""
 _FAILED = 1
 
 _NOTHING = Answer(done=False, message='Nothing is being recorded.')
@@ -78,7 +79,7 @@ class RecorderNode(ParameterNode):
         self._folders = RunFolders(self.values)
         self._log, self._stalls = RunLog(), ReceiveStalls()
         self._clock_watch = ClockWatch()
-        self._flags, self._next_news = 0, 0.0
+        self._flags, self._next_news, self._awaited = 0, 0.0, b''
         self._diagnostics = Diagnostics(self, 'run recorder')
         recorder_services.create_services(self)
         tasks = (
@@ -153,8 +154,7 @@ class RecorderNode(ParameterNode):
             self._snapshot = SnapshotBuffer(values['snapshot'])
         else:
             self._writer = self._folders.new_run(RunWriter)
-        sink: RunWriter | SnapshotBuffer | None = self._writer or self._snapshot
-        assert sink is not None  # noqa: S101 -- for the types
+        sink: Any = self._writer or self._snapshot
         self._failure = ''
         self._watch = TopicWatch(self, wanted, sink, self._write)
         self._log, self._stalls = RunLog(), ReceiveStalls()
@@ -181,20 +181,20 @@ class RecorderNode(ParameterNode):
         """Finish the run, with everything that has arrived."""
         if self._watch is None or (self._writer is None and self._snapshot is None):
             return _NOTHING
+        self._look()  # who came a moment ago is no riddle later
+        self._log_news(last=True)
         self._watch.end()
         if self._snapshot is not None:
             self._snapshot = None
             return Answer(done=True, message='What was in memory is dropped.')
-        if self._writer is None:
-            return _NOTHING
-        self._log_news(last=True)
         writer, self._writer = self._writer, None
-        stalls = {STALLS: str(self._stalls.count), 'longest_stall': f'{self._stalls.longest:g}'}
+        if writer is None:
+            return _NOTHING
         try:
             writer.commit()
             if self._log.pauses:
                 writer.note(PAUSES, self._log.pause_values())
-            writer.note(RECEPTION, {**self._watch.reception(), **stalls})
+            writer.note(RECEPTION, {**self._watch.reception(), **self._stalls.values()})
             writer.note(SUMMARY, closing_summary(self._log, self._noted))
             writer.close()
         except (OSError, LatheChatterError) as error:
@@ -204,8 +204,8 @@ class RecorderNode(ParameterNode):
             return Answer(done=False, message=self._failure)
         lost = sum(map(self.lost_of, self._topics))
         count = sum(map(self.messages_of, self._topics))
-        said = f'{writer.folder} holds {count} messages, and {lost} were lost on the way.'
-        return Answer(done=True, message=said)
+        held = f'{count} messages, and {lost} were lost on the way'
+        return Answer(done=True, message=f'{writer.folder} holds {held}.')
 
     def split(self) -> Answer:
         """Go on in a new file of the run.
@@ -301,6 +301,8 @@ class RecorderNode(ParameterNode):
             return
         sink.write(name, data, log_time=log_time, publish_time=publish_time, sequence=number)
         kind = self._topics[name].topic.type
+        if self._awaited and kind == LOG_TYPE and self._awaited in data:
+            self._awaited = b''
         self._log.receive(name, kind, data, log_time, publish_time)
 
     def _note_parameters(self, node: str, parameters: dict[str, Any]) -> None:
@@ -336,15 +338,26 @@ class RecorderNode(ParameterNode):
     def _log_news(self, *, last: bool = False) -> None:
         """Say from when there are samples, and where they are missing."""
         for topic, received in self._log.samples.items():
-            if any(each.order is BlockOrder.RESTART for each in received.discontinuities):
+            if received.restarted:
                 self._remote.want_again(topic.removesuffix('/samples'))
         now = time.monotonic()
-        if last or now > self._next_news:
-            sentences = [*news(self._log)]
-            # A place where samples are missing seldom comes alone.
-            self._next_news = now + (_NEWS_PERIOD if sentences else 0.0)
-            for sentence in sentences:
-                self.get_logger().info(sentence)
+        if not last and now <= self._next_news:
+            return
+        sentences = [*news(self._log)]
+        if sentences:  # a place where samples are missing seldom comes alone
+            self._next_news = now + _NEWS_PERIOD
+        for sentence in sentences:
+            self.get_logger().info(sentence)
+        if last and sentences and '/rosout' in self._topics:
+            self._hear(sentences[-1])
+
+    def _hear(self, sentence: str) -> None:
+        """Record until a sentence of its own has come."""
+        self._awaited = sentence.encode()
+        until = time.monotonic() + _ECHO
+        while self._awaited and time.monotonic() < until:
+            time.sleep(0.005)
+            self._take()
 
     def _fail(self, error: Exception) -> None:
         folder = self.run

@@ -111,7 +111,7 @@ class TopicWatch:
         self._wanted = wanted
         self.paused = False
         self._former: dict[str, dict[str, int]] = {}
-        self._most_publishers: dict[str, int] = {}
+        self._met: dict[str, set[tuple[int, ...]]] = {}
         self._since, self._began = time.time_ns(), time.monotonic()
 
     def look(self, on_publisher: Callable[[str, str], None]) -> None:
@@ -124,16 +124,19 @@ class TopicWatch:
         there = self._node.get_topic_names_and_types() if open_ended else ()
         for name in self._wanted.among(name for name, _ in there):
             offers = self._node.get_publishers_info_by_topic(name)
+            met = self._met.setdefault(name, set())
+            known = len(met)
+            met.update(tuple(offer.endpoint_gid) for offer in offers)
             topic = self.topics.get(name)
             if topic is not None and topic.is_of(offers):
-                topic.look([each for each in offers if each.topic_type == topic.topic.type])
+                same = [each for each in offers if each.topic_type == topic.topic.type]
+                topic.look(same, len(met))
             elif offers and self.refused.get(name) != offers[0].topic_type:
                 self._join(name, offers)
             for offer in offers:
                 on_publisher(offer.node_namespace, offer.node_name)
-            if len(offers) > self._most_publishers.get(name, 0):
-                self._most_publishers[name] = len(offers)
-                counts = {each: str(count) for each, count in self._most_publishers.items()}
+            if len(met) > known:
+                counts = {each: str(len(those)) for each, those in self._met.items() if those}
                 self._sink.note(PUBLISHERS, counts)
 
     def take(self) -> None:

@@ -31,8 +31,9 @@ from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
-_COMMIT_PERIOD = 0.1
-"""s between two commits: with the time that one takes this is what a kill can lose."""
+_COMMIT_PERIOD, _SIMULATED_COMMIT_PERIOD = 0.1, 0.05
+"""s between two commits: with the time that one takes this is what a kill can lose. Of a
+simulation a commit has more to write, some 100 MB a second."""
 _SECOND = 10**9
 
 
@@ -71,7 +72,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
         self._begun = self._now = time.time_ns()
         self._simulated = simulated
         self._sequences: dict[str, int] = {}
-        self._committed = time.monotonic()
+        self._period = _SIMULATED_COMMIT_PERIOD if simulated else _COMMIT_PERIOD
         self._closed = False
         self._clock = ClockWatch()
         self._log, self._parameters = RunLog(), dict(parameters)
@@ -86,9 +87,10 @@ class LatheRun(AbstractContextManager['LatheRun']):
             self._announce(topic, kind)
         announced = parameters_bytes(name, dict(parameters), self._begun)
         self._add('/parameter_events', announced)
+        self.commit()  # which has the disk keep metadata.yaml: that takes its time once
 
     def write(self, samples: Array) -> None:
-        """Write a block of samples (n, 8) or (n, 10), n > 0; every 0.25 s also put it all on disk.
+        """Write a block of samples (n, 8) or (n, 10), n > 0; from time to time put it all on disk.
 
         Raises:
             LatheChatterError: If the disk has too little room left.
@@ -98,7 +100,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
             self._now = self._begun + round(float(samples[-1, 0]) * _SECOND)
         columns = sample_columns(accelerometers=samples.shape[1] > len(SAMPLE_COLUMNS))
         self._add(self._samples, encode_block(samples, columns))
-        if time.monotonic() - self._committed > _COMMIT_PERIOD:
+        if time.monotonic() - self._committed > self._period:
             self.commit()
 
     def log(self, sentence: str) -> None:

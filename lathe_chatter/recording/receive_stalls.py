@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from lathe_chatter.recording.provenance import STALLS
+
 _STALL = 0.1
 """s between two times that messages are taken which count as a stall; usual are 0.02 s."""
 
@@ -27,3 +29,7 @@ class ReceiveStalls:
             self.longest = max(self.longest, passed)
             self.count += passed > _STALL
         self._last = now
+
+    def values(self) -> dict[str, str]:
+        """What a run notes of them."""
+        return {STALLS: str(self.count), 'longest_stall': f'{self.longest:g}'}

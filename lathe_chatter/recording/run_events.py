@@ -119,6 +119,11 @@ class SamplesReceived:
             self.first, self.head = first, missing
         self.discontinuities.append(Discontinuity(order, before, first, missing))
 
+    @property
+    def restarted(self) -> bool:
+        """Whether a lathe began again, and that is not logged yet."""
+        return any(each.order is BlockOrder.RESTART for each in self.discontinuities)
+
     def pause(self) -> None:
         """Blocks are left out from now on."""
         self._paused, self._published = True, 0

@@ -1,8 +1,8 @@
 """Losses on the way, told by the numbers that publishers give their messages.
 
 A message says its number but not its publisher, and topics such as /diagnostics have several.
-So numbers are followed as sequences that grow by one; where there are more sequences than
-publishers, one ended and another went on in its place, and what lies between was lost.
+So numbers are followed as sequences that grow by one; where there are more sequences than there
+ever were publishers, one ended and another went on in its place, and what lies between was lost.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Numbering:
         """Conclude what has been lost, where the graph is known to have so many publishers.
 
         Args:
-            publishers: How many the topic has.
+            publishers: How many the topic has had.
             now: Steady time, s; infinite at the end, when nothing more will settle.
         """
         late = [each for each in self._sequences if each.begun <= now - _SETTLING]

@@ -144,7 +144,7 @@ def _report_numbering(
 
 
 def _publishers(run: Run) -> dict[str, int]:
-    """How many publishers each topic had when it was found, or at most where that was noted."""
+    """How many publishers each topic had when it was found, or in all where that was noted."""
     numbers: dict[str, int] = {}
     for file in run.opened:
         for channel in file.known.channels.values():

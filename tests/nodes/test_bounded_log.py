@@ -72,3 +72,14 @@ def test_names_without_end_are_one_kind_beyond_a_bound() -> None:
     for k in range(10 * MAX_KINDS):
         bounded.info(f'topic {k}')
     assert len(out.lines) == MAX_KINDS + BURST
+
+
+def test_what_is_held_back_when_the_node_ends_is_told() -> None:
+    out = Lines()
+    bounded = BoundedLog(out, out.now)
+    for k in range(BURST + 3):
+        bounded.warning(f'{k} samples are missing.', 'missing')
+    bounded.end()
+    assert out.lines[-1][1] == f'{BURST + 2} samples are missing. (3 of this kind in 0 s.)'
+    bounded.end()
+    assert len(out.lines) == BURST + 1

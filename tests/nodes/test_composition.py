@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from rcl_interfaces.srv import GetParameters
 from std_msgs.msg import Bool
 from support.node_bench import LATCHED, Bench
@@ -45,6 +46,23 @@ def test_a_cell_cuts_flags_and_records_all_of_it(bench: Bench, nodes: NodeProces
     (computed,) = resimulate(read_run(run))
     assert computed.proven, computed.obstacle
     assert computed.compared == np.size(times)
+
+
+@pytest.mark.parametrize('factor', [100.0, 0.0])
+def test_a_cell_that_cannot_keep_up_slows_down_and_loses_nothing(
+    factor: float, bench: Bench, nodes: NodeProcesses
+) -> None:
+    reports = Reports(bench)
+    run = nodes.folder / 'run'
+    values = f'lathe:real_time_factor:={factor}', f'run_recorder:output:={run}'
+    nodes.start('cell', *CHATTER, *values)
+    kept = lambda: reports.value('/run_recorder: recording', 'messages')  # noqa: E731
+    bench.spin_until(lambda: float(kept() or 0) > 20_000, 'thousands of blocks')
+    nodes.interrupt('/cell')
+    found = verify(run)
+    assert not [finding.text for finding in found.findings if finding.loss]
+    assert found.samples['/lathe/samples'].first == 1e-4
+    assert found.samples['/lathe/samples'].samples > 300_000
 
 
 def test_a_wrong_parameter_of_one_of_them_keeps_the_cell_from_starting(

@@ -136,6 +136,33 @@ def test_what_was_before_a_recorder_began_is_not_lost(
     assert '0 were lost' in recorder.stop().message
 
 
+def test_what_a_publisher_said_before_it_was_heard_is_no_loss_of_the_one_before(
+    start: Start, apart: Callable[[str], Node], spin_until: Any, tmp_path: Path
+) -> None:
+    """As of /parameter_events, of a node that was killed and started again."""
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
+    first = apart('first')
+    before = first.create_publisher(Float64, '/n', 100)
+    spin_until(before.get_subscription_count, 'the recorder')
+    for k in range(10):
+        before.publish(Float64(data=float(k)))
+    spin_until(lambda: recorder.messages_of('/n') == 10, 'the first')
+    first.destroy_publisher(before)
+    after = apart('second').create_publisher(Float64, '/n', 100)
+    for k in range(30):  # nobody has met it yet
+        after.publish(Float64(data=float(k)))
+    spin_until(after.get_subscription_count, 'the recorder')
+    for k in range(30, 50):
+        after.publish(Float64(data=float(k)))
+    spin_until(lambda: recorder.messages_of('/n') >= 30, 'the second')
+    came = recorder.messages_of('/n')
+    recorder.stop()
+    assert recorder.lost_of('/n') == 0
+    found = verify(tmp_path / 'run')
+    assert found.messages['/n'] == came
+    assert [finding.text for finding in found.findings if finding.loss] == []
+
+
 def test_two_recorders_that_begin_in_one_second_have_a_folder_each(
     start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

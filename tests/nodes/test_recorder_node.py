@@ -161,6 +161,25 @@ def test_a_gap_in_the_samples_is_told_by_their_own_times(
     assert (counted['head'], counted['lost'], counted['gaps']) == (40, 40, 1)
 
 
+def test_what_the_recorder_says_last_is_in_the_record(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    """Of gaps that follow each other it tells a while later, or at its end."""
+    topics = ['lathe/samples', '/rosout']
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=topics)
+    spin_until(lambda: '/rosout' in recorder._topics, 'its own log')
+    publisher = bench.node.create_publisher(Float64MultiArray, '/lathe/samples', KEPT)
+    lathe = VirtualLathe()
+    publisher.publish(encode_block(lathe.advance(20)))
+    spin_until(lambda: recorder._next_news, 'the first of its news')
+    lathe.advance(40)
+    publisher.publish(encode_block(lathe.advance(20)))
+    spin_until(lambda: recorder.messages_of('/lathe/samples') == 2, 'the blocks')
+    recorder.stop()
+    said = [m.message.msg for m in read_run(tmp_path / 'run').messages('/rosout')]
+    assert '/lathe/samples: 40 samples between 0.002000 s and 0.006100 s did not come.' in said
+
+
 def test_publishers_that_share_a_topic_lose_nothing(
     start: Start, bench: Bench, spin_until: Any, tmp_path: Path
 ) -> None:

@@ -7,15 +7,35 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
-from lathe_chatter.recording import read_run, verify
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.recording import LatheRun, lathe_run_writer, read_run, verify
 
 PATIENCE = 60.0
 """s."""
+
+
+def test_what_is_made_is_committed_before_much_more_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill costs a quarter of a second of work, the time that a commit takes included."""
+    now = [100.0]
+    monkeypatch.setattr(lathe_run_writer, 'time', SimpleNamespace(
+        monotonic=lambda: now[0], time_ns=time.time_ns
+    ))  # fmt: skip
+    lathe = VirtualLathe()
+    run = LatheRun(tmp_path / 'run', {}, simulated=True)
+    assert verify(tmp_path / 'run').messages == {'/parameter_events': 1}
+    for _ in range(10):
+        run.write(lathe.advance(500))
+        now[0] += 0.03
+    assert verify(tmp_path / 'run').messages['/lathe/samples'] >= 8
+    run.close()
 
 
 @pytest.mark.parametrize('size', [1 << 20, 5 << 20, 20 << 20])
