@@ -45,8 +45,8 @@ _STEP_LIMIT = 60.0
 _LIKELY = 2.0
 """Standard errors within which C w may well be."""
 _CORRELATION = 1.2
-"""Variance of a sum over outputs that overlap, over what independent ones would have; checked
-by `python benchmarks/detection check`."""
+"""Variance of a sum over outputs that overlap, over the mean square of both parts of a misfit, of
+which independent ones would have half; found by simulation."""
 _USUAL = 50.0
 """Outputs that the usual misfit counts for beside a window's own."""
 _LEAST = 0.1
@@ -180,7 +180,7 @@ def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: 
     """What white noise of the thinned samples adds to the sums of one output.
 
     Args:
-        spill: From `kernels.Kernels`.
+        spill: From `filters.Kernels`.
         tool: Variance of the noise of the tool's thinned samples, m2.
         workpiece: The same of the workpiece.
         turn: Thinned samples a turn.

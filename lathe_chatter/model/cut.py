@@ -14,7 +14,7 @@ from lathe_chatter.model.quantities import check_choice, check_fields, quantity
 
 
 class BearingContact(str, Enum):
-    """How the bearing clearance enters the model (see the README for what the paper did)."""
+    """How the bearing clearance enters the model; docs/explanation/model.md has the paper's."""
 
     NONE = 'none'
     """No bearing clearance in the model, equations (1)-(7)."""

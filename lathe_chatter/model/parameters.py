@@ -3,7 +3,7 @@
 `tool.mass` is the mass of the machine's tool, `depth_of_cut` a field of the cut: the names are
 those of the node `lathe`, whether there is one or not. Units, limits and meanings stand once,
 beside the fields of the model; the node's declarations, the options of the command line,
-scenarios, recorded runs and the README are made from these rows.
+scenarios, recorded runs and the documentation are made from these rows.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What a field of the model may hold: unit, range and meaning, stated once beside the field.
 
-Validation in the core, the parameter descriptors of the nodes and the tables of the README are
-all made from these.
+Validation in the core, the parameter descriptors of the nodes and the tables of the documentation
+are all made from these.
 """
 
 from __future__ import annotations

@@ -54,8 +54,8 @@ class LatheNode(ParameterNode):
     none while paused, one as a rule, several after a delay or at a real-time factor above 1.
     Under `use_sim_time` that clock is /clock, and its time is cut but for jumps.
 
-    Topics, services and parameters are those of the README. A parameter set takes effect
-    between two samples, all of an atomic set at the same one.
+    Topics, services and parameters are those of docs/reference/nodes.md. A parameter set takes
+    effect between two samples, all of an atomic set at the same one.
 
     Args:
         by_timer: Whether a timer wakes it, so that any executor will do; else its loop calls

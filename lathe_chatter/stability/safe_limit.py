@@ -6,8 +6,9 @@ line
 
     w = k_wp gamma / (C f)
 
-on it rests on its bearing and the seated limit holds, which may be lower or higher. This judges
-small disturbances: a hard knock can drive a floating workpiece against its bearing.
+on it rests on its bearing and the seated limit holds, which may be lower or higher. Of several
+modes 1/k_wp is the sum of phi_B phi_F / k. This judges small disturbances: a hard knock can drive
+a floating workpiece against its bearing.
 
 Without a mean force and without clearance the workpiece stands exactly where its bearing begins:
 the smallest vibration touches it in every cycle, and what holds then is neither limit, nor the

@@ -6,8 +6,8 @@ At the point where the tool cuts, a body of n modes has the receptance
 
 with a for the modes above the band and b for those below (Ewins, Modal Testing, 2.4). Poles from
 the least-squares complex frequency method (sdypy-EMA) are candidates; modes are taken from them
-one at a time, the one that explains most first, while the Bayesian information criterion falls;
-SciPy's least squares refines all figures together. The noise of each frequency is what the
+one at a time, the one that explains most first, while the Bayesian information criterion falls by
+10; SciPy's least squares refines all figures together. The noise of each frequency is what the
 coherence says, scaled by the residual, or a floor and a share of the response, both found from
 the residual.
 """
