@@ -2,7 +2,7 @@
 
 The project's lathe locates every event to 1e-10 and needs 8 ms per simulated second; a
 detector is judged on many hours and on disturbances that the lathe does not have (unbalance,
-harmonics of the runout). Here each mode is advanced exactly by a 10 kHz step under a force that
+harmonics of the runout). Here each mode is advanced exactly by one sample under a force that
 is linear in between, and the cutting force at the end of the step is solved for, not lagged:
 
     m x'' + c x' + k x = f,    F = C w max(h, 0) or C w h,    h = r + fed - (surface met),
@@ -26,6 +26,7 @@ from lathe_chatter.model import Machine, Mode
 
 RATE = 1e4
 COLUMNS = ('time', 'spindle_angle', 'tool_displacement', 'workpiece_displacement')
+ACCELERATIONS = ('tool_acceleration', 'workpiece_acceleration')
 HARMONICS = (5e-6, 2e-6, 1e-6)
 """Runout at the workpiece's sensor, once, twice and three times a turn, m."""
 
@@ -63,6 +64,10 @@ class Surroundings:
         harmonic_force: More forces on the workpiece: (times a turn, N).
         runout: At the workpiece's sensor, once, twice, ... a turn, m.
         tool_runout: At the tool's sensor, once a turn, m.
+        at_the_cut: Whether the random force is one of the cut, equal and opposite on the
+            workpiece, and not on the tool alone.
+        rate: Samples a second, Hz.
+        machine: What cuts.
     """
 
     force_noise: float = 2e-7
@@ -72,12 +77,14 @@ class Surroundings:
     harmonic_force: Sequence[tuple[float, float]] = ()
     runout: Sequence[float] = HARMONICS
     tool_runout: float = 0.0
+    at_the_cut: bool = False
+    rate: float = RATE
     machine: Machine = field(default_factory=Machine)
 
 
-def _step_of(mode: Mode, stiffness: float) -> Array:
+def _step_of(mode: Mode, stiffness: float, rate: float) -> Array:
     """x, v after a step from x, v, the force at its start and the force at its end (2, 4)."""
-    step = 1.0 / RATE
+    step = 1.0 / rate
     a = np.zeros((4, 4))
     a[0, 1] = 1.0
     a[1] = [-stiffness / mode.mass, -mode.damping / mode.mass, 1.0 / mode.mass, 0.0]
@@ -116,14 +123,16 @@ def _cut(  # noqa: PLR0913, PLR0917 -- one loop over plain numbers
     angles[0], angles[1] = -2.0, 0.0
     surface[0] = surface[1] = 0.0
     chip, kick, may_leave = numbers[0], numbers[1], numbers[0] > 0.0
+    back, rate = numbers[2], numbers[3]
     xt = vt = xw = vw = fed = angle = pull = force = 0.0
     surface[0], surface[1] = -2.0 * chip, 0.0
     place = 0
     for n in range(count):
         speed, cutting, seated = plan[n, 0], plan[n, 1], int(plan[n, 2])
-        angle += speed / RATE
-        fed += chip * speed / RATE
+        angle += speed / rate
+        fed += chip * speed / rate
         vt += kick * normal[n] + plan[n, 3]
+        vw += back * normal[n]
         pushed = 0.0
         for k in range(forces.shape[0]):
             pushed += forces[k, 1] * math.cos(2.0 * math.pi * forces[k, 0] * angle)
@@ -154,29 +163,33 @@ def _cut(  # noqa: PLR0913, PLR0917 -- one loop over plain numbers
         angles[n + 2] = angle
         left = xt - xw + fed
         surface[n + 2] = met if may_leave and left < met else left
-        out[n, 0], out[n, 1] = (n + 1) / RATE, angle
-        out[n, 2], out[n, 3] = xt, xw
+        out[n, 0], out[n, 1] = (n + 1) / rate, angle
+        out[n, 2], out[n, 3], out[n, 4] = xt, xw, force
+        out[n, 5], out[n, 6], out[n, 7] = vt, vw, pull
 
 
-def simulate(plan: Sequence[Stretch], around: Surroundings, seed: int) -> Array:
+def simulate(
+    plan: Sequence[Stretch], around: Surroundings, seed: int, *, accelerations: bool = False
+) -> Array:
     """Cut one stretch after another, from rest.
 
     Args:
         plan: What is cut.
         around: What disturbs it.
         seed: Of every random number.
+        accelerations: Whether the accelerations of both are wanted too, m/s2.
 
     Returns:
-        Samples (n, 4), columns as in `COLUMNS`, at 10 kHz.
+        Samples (n, 4), columns as in `COLUMNS`, or (n, 6) with `ACCELERATIONS`.
     """
     rng = np.random.default_rng(seed)
-    machine = around.machine
+    machine, rate = around.machine, around.rate
     rows, speed = [], plan[0].rpm / 60.0
     for stretch in plan:
-        count = round(stretch.duration * RATE)
+        count = round(stretch.duration * rate)
         block = np.empty((count, 4))
         target = stretch.rpm / 60.0
-        progress = np.arange(1, count + 1) / (stretch.ramp * RATE) if stretch.ramp else np.ones(1)
+        progress = np.arange(1, count + 1) / (stretch.ramp * rate) if stretch.ramp else np.ones(1)
         block[:, 0] = speed + (target - speed) * np.minimum(progress, 1.0)
         block[:, 1] = machine.cutting_stiffness(stretch.depth)
         block[:, 2] = stretch.seated
@@ -185,22 +198,27 @@ def simulate(plan: Sequence[Stretch], around: Surroundings, seed: int) -> Array:
         rows.append(block)
         speed = float(block[-1, 0])
     steps = np.vstack(rows)
-    tool = _step_of(machine.tool, machine.tool.stiffness)
-    workpiece = np.stack(
-        [
-            _step_of(machine.workpiece, machine.workpiece_stiffness(seated=seated))
-            for seated in (False, True)
-        ]
-    )
-    kick = math.sqrt(around.force_noise / RATE) / machine.tool.mass
+    stiffness = np.array([machine.workpiece_stiffness(seated=seated) for seated in (False, True)])
+    tool = _step_of(machine.tool, machine.tool.stiffness, rate)
+    workpiece = np.stack([_step_of(machine.workpiece, each, rate) for each in stiffness])
+    impulse = math.sqrt(around.force_noise / rate)
+    back = -impulse / machine.workpiece.mass if around.at_the_cut else 0.0
     forces = np.array([(1.0, around.unbalance), *around.harmonic_force])
-    out = np.empty((len(steps), 4))
-    numbers = np.array([around.chip, kick])
+    out = np.empty((len(steps), 8))
+    numbers = np.array([around.chip, impulse / machine.tool.mass, back, rate])
     _cut(tool, workpiece, steps, numbers, forces, rng.standard_normal(len(steps)), out)
+    motion = out[:, 2:].copy()
     turn = 2.0 * math.pi * out[:, 1]
     for number, amplitude in enumerate(around.runout, 1):
         out[:, 3] += amplitude * np.cos(number * turn + number)
     out[:, 2] += around.tool_runout * np.cos(turn + 0.5)
     if around.sensor_noise:
-        out[:, 2:] += around.sensor_noise * rng.standard_normal((len(out), 2))
-    return out
+        out[:, 2:4] += around.sensor_noise * rng.standard_normal((len(out), 2))
+    if not accelerations:
+        return out[:, :4].copy()
+    tool_x, workpiece_x, force, tool_v, workpiece_v, pull = motion.T
+    held = stiffness[steps[:, 2].astype(int)]
+    pulled = -force - machine.tool.damping * tool_v - machine.tool.stiffness * tool_x
+    pushed = force + pull - machine.workpiece.damping * workpiece_v - held * workpiece_x
+    heard = (pulled / machine.tool.mass, pushed / machine.workpiece.mass)
+    return np.column_stack([out[:, :4], *heard])

@@ -12,16 +12,18 @@ from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.filters import UNKNOWN_MACHINE
 from lathe_chatter.detection.motion_filter import sensors_among
-from lathe_chatter.errors import ParameterError, SignalFileError
+from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import Judged, Score, judge, read_signals, score
 from lathe_chatter.listening.judging import read_labels
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.plot_style import files_of_picture
 
-EXAMPLE = 'lathe-chatter listen shop.wav --band 500:1500 --labels shop.csv --output heard.png'
+EXAMPLE = 'lathe-chatter listen shop.wav --labels shop.csv --output heard.png'
 
-_FREQUENCY = Quantity('a frequency', 'Hz', high=1e6, exclusive=True)
+_RATE = Quantity('a sample rate', 'Hz', high=1e6, exclusive=True)
+_FREQUENCY = Quantity('a frequency', 'Hz', high=50_000.0)
+_SPEED = Quantity('a spindle speed', 'rev/min', low=60.0, high=30_000.0, or_zero=True)
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -29,9 +31,10 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument('recording', type=Path, metavar='FILE', help='the recording')
     parser.add_argument(
         '--columns', metavar='NAMES',
-        help='what its columns or channels are, with commas: time, spindle_angle (rev), tool_ and '
-        'workpiece_ displacement, velocity or acceleration (SI), sound, force (default: their '
-        'names in the file; the first channel of a WAV is sound)',
+        help='what its columns or channels are, with commas: time, spindle_angle (rev) or '
+        'spindle_pulse (rises once a turn), tool_ and workpiece_ displacement, velocity or '
+        'acceleration (SI), sound, force (default: their names in the file; the first channel of '
+        'a WAV is sound)',
     )  # fmt: skip
     parser.add_argument(
         '--rate', type=in_unit('Hz'), metavar='HZ', help='sample rate, where there are no times'
@@ -39,10 +42,15 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         '--machine', metavar='FILE', help='machine file, or the name of one that is shipped'
     )
+    for which, usual in (('lowest', UNKNOWN_MACHINE.low), ('highest', UNKNOWN_MACHINE.high)):
+        parser.add_argument(
+            f'--{which}-frequency', type=in_unit('Hz'), metavar='HZ', default=0.0,
+            help=f'{which} frequency at which chatter is looked for without a machine (default: '
+            f'{usual:g} Hz{", if the sample rate allows" if which == "highest" else ""})',
+        )  # fmt: skip
     parser.add_argument(
-        '--band', metavar='LOW:HIGH',
-        help='where chatter is looked for without a machine, Hz (default: '
-        f'{UNKNOWN_MACHINE.low:g}:{UNKNOWN_MACHINE.high:g}); the narrower, the surer',
+        '--spindle-speed-rpm', type=in_unit('rev/min'), metavar='RPM', default=0.0,
+        help='nominal spindle speed, where no column is an angle or a pulse a turn',
     )  # fmt: skip
     parser.add_argument(
         '--labels', type=Path, metavar='CSV',
@@ -59,7 +67,7 @@ def run(options: Namespace) -> int:
     if options.output is not None:
         keep_existing(*files_of_picture(picture_file(options.output)), force=options.force)
     columns = options.columns and [name.strip() for name in options.columns.split(',')]
-    rate = None if options.rate is None else _FREQUENCY.check('--rate', options.rate)
+    rate = None if options.rate is None else _RATE.check('--rate', options.rate)
     labels = [] if options.labels is None else read_labels(options.labels)
     signals = read_signals(options.recording, columns=columns, rate=rate)
     sensors = sensors_among(signals.columns)
@@ -69,7 +77,12 @@ def run(options: Namespace) -> int:
             'sensor by its name; --columns says what they are.'
         )
     machine = None if options.machine is None else load_machine(options.machine).machine
-    detector = ChatterDetector(machine, unknown_band=_band(options.band))
+    detector = ChatterDetector(
+        machine,
+        lowest_frequency=_FREQUENCY.check('--lowest-frequency', options.lowest_frequency),
+        highest_frequency=_FREQUENCY.check('--highest-frequency', options.highest_frequency),
+        nominal_rpm=_SPEED.check('--spindle-speed-rpm', options.spindle_speed_rpm),
+    )
     screen.compile()
     with screen.progress('listening', len(signals.samples) / signals.rate, 's') as bar:
         judged = judge(signals, detector, bar.advance)
@@ -99,20 +112,6 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _band(text: str | None) -> tuple[float, float]:
-    if text is None:
-        return UNKNOWN_MACHINE
-    parts = text.split(':')
-    try:
-        low, high = (float(part) for part in parts)
-    except ValueError:
-        raise ParameterError('--band', text, 'Hz', 'two numbers, as 500:1500') from None
-    _FREQUENCY.check('--band', low), _FREQUENCY.check('--band', high)
-    if not low < high:
-        raise ParameterError('--band', text, 'Hz', 'a lower and a higher frequency, as 500:1500')
-    return low, high
-
-
 def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
     rows = [
         (
@@ -136,8 +135,9 @@ def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
         delay = 'none' if math.isnan(found.delay) else f'{found.delay:.2f} s (median)'
         screen.say(
             f'labels      F1 of seconds {_known(found.f1, ".3f") or "none: no chatter in them"}, '
-            f'{found.found} of {found.events} events, delay {delay}, {found.false_alarms} false '
-            f'alarms in {found.quiet_hours:.3g} quiet hours'
+            f'of events {_known(found.event_f1, ".3f") or "none"} ({found.found} of '
+            f'{found.events}), delay {delay}, {found.false_alarms} false alarms in '
+            f'{found.quiet_hours:.3g} quiet hours'
         )
 
 

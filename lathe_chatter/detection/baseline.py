@@ -106,6 +106,22 @@ def follow_energy(state: DetectorState, newest: int) -> int:
 
 
 @compiled(inner=True)
+def follow_lines(state: DetectorState, newest: int) -> int:
+    """Mean power of every resonator, and of its square; the loudest of them."""
+    now = state.now[0]
+    loudest, most = 0, -1.0
+    for j in range(state.line.shape[1]):
+        share = max(state.line_shares[j], 1.0 / (now.hops_seen + 1.0))
+        sample = state.motion[newest, j]
+        power = sample.real**2 + sample.imag**2
+        state.line[0, j] += share * (power - state.line[0, j])
+        state.line[1, j] += share * (power**2 - state.line[1, j])
+        if state.line[0, j] > most:
+            loudest, most = j, state.line[0, j]
+    return loudest
+
+
+@compiled(inner=True)
 def hold(now: Any) -> None:
     """Take no rise of energy for chatter until the disturbance is over."""
     now.since_jump = 0

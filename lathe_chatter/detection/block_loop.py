@@ -145,6 +145,10 @@ def take_hops(
             identify(products, newest, lengths, mechanics, noise, 1.0 / speed, now, total, windows)
             if now.hops_seen % _ROOT_EVERY == 0 or 0 < now.holding <= _NEW_CUT:
                 _follow_roots(now, windows, mechanics, speed)
+        if settings.has_machine == 0:
+            alone = abs(memory.resonators[now.strongest])
+            alone *= 1.0 - abs(kernels.poles[now.strongest])
+            products[newest].tool_power = products[newest].outputs * alone**2
         _powers(products, newest, plain)
         judge(state, settings, products, windows, plain, memory.phases, turns, centres, speed)
         now.fit_hops += 1

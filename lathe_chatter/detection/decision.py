@@ -21,6 +21,7 @@ from lathe_chatter.detection.baseline import (
     ARMED,
     SETTLING,
     follow_energy,
+    follow_lines,
     follow_misfit,
     follow_phase,
     follow_push,
@@ -190,10 +191,11 @@ def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: 
         lasting = min(lasting, state.amplitudes[(now.newest - back) % HOPS])
     now.peak_amplitude = max(now.peak_amplitude, lasting)
     # Where the alarm came at the level of the noise there is no way down but to the baseline.
-    down = recent_amplitude < _QUIET * now.peak_amplitude or now.rise < ARMED
+    down = recent_amplitude < _QUIET * now.peak_amplitude
+    down = down or (now.rise < ARMED and now.by_line == 0)
     now.calm = now.calm + 1 if down else 0
     if now.calm >= _CALM:
-        now.alarmed = now.saturated = 0
+        now.alarmed = now.saturated = now.by_line = 0
         restart_baseline(state)
 
 
@@ -220,6 +222,11 @@ def judge(
     model = settings.has_machine != 0 and settings.believed != 0
     follow_speed(state, speed, 1.0 / max(speed * period, 1e-9))
     strongest = follow_energy(state, newest)
+    if settings.has_machine == 0:
+        loudest = follow_lines(state, newest)
+        if now.by_line != 0 or now.rise != now.rise:
+            strongest = loudest
+        now.strongest = strongest
     if phases[PHASE_SEEN].min() >= 1.0:
         follow_phase(state, phases)
     wave = (np.nan, np.nan, np.nan)

@@ -21,6 +21,8 @@ SPEEDS = 5
 
 # States, in the order of `estimate.STATES`.
 IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = range(6)
+SERIOUSNESS = (1, 2, 4, 5, 3, 0)
+"""Of the states, where several bands are judged: the most serious one is said."""
 
 
 _NOW = record_type(
@@ -33,7 +35,7 @@ _NOW = record_type(
     """
     newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
     block_fill saturated stepped hold_ended
-    fit_hops fit_is_due
+    fit_hops fit_is_due by_line line_gone strongest
     """,
     'root deeper_root',
 )
@@ -53,6 +55,8 @@ class DetectorState(NamedTuple):
         baseline: Their mean, behind by a lag (bins,).
         speeds: Of the last hops, rev/s (SPEEDS,).
         amplitudes: Of the tool in the last hops, as a ring, m (HOPS,).
+        line: Mean of the power of each resonator, and of its square (2, bins).
+        line_shares: Of the newest power in these means (bins,).
         plain_scores: What would be suspected without a machine, as a ring (HOPS,).
     """
 
@@ -63,6 +67,8 @@ class DetectorState(NamedTuple):
     baseline: Array
     speeds: Array
     amplitudes: Array
+    line: Array
+    line_shares: Array
     plain_scores: Array
 
 
@@ -86,5 +92,7 @@ def new_state(bins: int, **values: object) -> DetectorState:
         np.full(bins, np.nan),
         np.zeros(SPEEDS),
         np.zeros(HOPS),
+        np.zeros((2, bins)),
+        np.ones(bins),
         np.zeros(HOPS),
     )

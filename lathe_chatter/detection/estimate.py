@@ -32,19 +32,28 @@ class Mode(str, Enum):
     MIXTURE = 'sound or force alone, which does not tell how fast a vibration grows'
     NO_MACHINE = 'the machine is not known'
     NO_SPINDLE = 'the spindle is not seen'
+    NOMINAL = 'a spindle speed that is only nominal, and so without a machine'
     BLIND = 'no sensor that can be believed'
     TOO_SLOW = 'a sample rate that is too low for the frequencies of the machine'
     WAITING = 'no samples yet'
 
     @classmethod
     def of(
-        cls, machine: Machine | None, *, angle: bool, workpiece: bool, mixed: bool = False
+        cls,
+        machine: Machine | None,
+        *,
+        angle: bool,
+        workpiece: bool,
+        mixed: bool = False,
+        nominal: bool = False,
     ) -> Mode:
         """The mode for what is there; the gravest lack names it."""
         if mixed:
             return cls.MIXTURE if angle else cls.NO_SPINDLE
         if not angle:
             return cls.NO_SPINDLE
+        if nominal:
+            return cls.NOMINAL
         if not workpiece:
             return cls.ONE_SENSOR
         return cls.FULL if machine is not None else cls.NO_MACHINE

@@ -9,6 +9,7 @@ from it are correlated within it, and C w comes out up to 40 % wrong in a quiet 
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -43,8 +44,15 @@ class Band(NamedTuple):
         return 0.5 * (self.low + self.high)
 
 
-UNKNOWN_MACHINE = Band(60.0, 600.0)
+UNKNOWN_MACHINE = Band(20.0, 5000.0)
 """Where chatter is looked for on a machine of which nothing is known."""
+HIGHEST_SEEN = 0.45
+"""Of the sample rate: no vibration above is told from one below."""
+_WIDEST = 5.0
+"""Highest over lowest frequency of a band that is judged by itself."""
+_USUAL_MIDDLE, _SLOWEST, _FASTEST = 170.0, 4.0, 0.125
+"""Middle of a band, Hz, in which the usual times hold, and how much longer and shorter they may
+become elsewhere: what chatters at ten times the frequency grows ten times as fast."""
 
 
 class Kernels(NamedTuple):
@@ -73,10 +81,22 @@ class Kernels(NamedTuple):
 BAND_BAND, FORCE_BAND, FORCE_FORCE, INERTIA_BAND, SPILLS = range(5)
 
 
-def band_of(machine: Machine | None, unknown: Band = UNKNOWN_MACHINE) -> Band:
-    """The band that holds the chatter of a machine, open or seated; `unknown` without one."""
-    if machine is None:
-        return unknown
+def pace_of(band: Band) -> float:
+    """How many times as long as usual everything takes in a band, a power of two."""
+    octaves = round(math.log2(_USUAL_MIDDLE / band.middle))
+    return min(max(2.0**octaves, _FASTEST), _SLOWEST)
+
+
+def bands_of(whole: Band) -> list[Band]:
+    """The bands into which a wide one is divided, each with its own pace; one if it is narrow."""
+    ratio = whole.high / whole.low
+    count = max(1, math.ceil(math.log(ratio) / math.log(_WIDEST)))
+    edges = [whole.low * ratio ** (k / count) for k in range(count + 1)]
+    return [Band(low, high) for low, high in itertools.pairwise(edges)]
+
+
+def band_of(machine: Machine) -> Band:
+    """The band that holds the chatter of a machine, open or seated."""
     lowest, highest = _frequencies(machine)
     return Band(BELOW * lowest, ABOVE * highest)
 
@@ -89,18 +109,15 @@ def _frequencies(machine: Machine) -> tuple[float, float]:
     return min(tool, workpiece) / turn, max(tool, workpiece, math.sqrt(seated)) / turn
 
 
-def design(
-    machine: Machine | None, rate: float, decay: float, unknown: Band = UNKNOWN_MACHINE
-) -> Kernels:
+def design(machine: Machine | None, rate: float, decay: float, chatter: Band) -> Kernels:
     """The kernels for thinned samples at `rate` Hz; without a machine the force is zero.
 
     Args:
         machine: Tool, workpiece and bearing, or None.
         rate: Of the thinned samples, Hz.
         decay: Of the resonators, 1/s.
-        unknown: The band where there is no machine.
+        chatter: Where chatter is looked for.
     """
-    chatter = band_of(machine, unknown)
     wide = chatter
     if machine is not None:
         lowest, highest = _frequencies(machine)
@@ -144,11 +161,8 @@ def design(
     )
 
 
-def thinning_of(
-    machine: Machine | None, rate: float, unknown: Band = UNKNOWN_MACHINE
-) -> tuple[int, int]:
+def thinning_of(band: Band, rate: float) -> tuple[int, int]:
     """Samples in a thinned sample, and thinned samples in an output, at a sample rate, Hz."""
-    band = band_of(machine, unknown)
     thinning = max(1, int(rate / (_RATES_PER_WIDTH * band.high)))
     return thinning, max(1, round(rate / thinning / (2.25 * band.high)))
 

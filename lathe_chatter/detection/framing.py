@@ -14,9 +14,10 @@ from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.channel_watch import faults_of, new_channels, watch_channels
 from lathe_chatter.detection.motion_filter import MotionFilter, Sensors, sensors_among
+from lathe_chatter.detection.spindle import PulseAngle
 from lathe_chatter.errors import LayoutError
 
-_TIME, _ANGLE = 'time', 'spindle_angle'
+_TIME, _ANGLE, _PULSE = 'time', 'spindle_angle', 'spindle_pulse'
 _RATE_SAMPLES = 33
 """Samples at the start of a stretch from which its sample rate is taken."""
 
@@ -37,12 +38,14 @@ class StreamFormat(NamedTuple):
         angle: Whether the spindle angle is seen.
         workpiece: Whether both displacements are; with one it stands where the tool's would.
         mixed: Whether the one signal is a sound or a force instead of the motion of a body.
+        nominal: Whether the angle follows from a speed that was only told.
     """
 
     rate: float
     angle: bool
     workpiece: bool
     mixed: bool = False
+    nominal: bool = False
 
 
 class HopBlock(NamedTuple):
@@ -64,14 +67,20 @@ class Framer:
     A sample that is no number counts as lost; a sensor that is dead or missing is done without
     until it has been well for a while. Nothing depends on how the samples were cut into batches.
 
+    Args:
+        nominal: Spindle speed, rev/s, for samples with neither an angle nor a pulse a turn; 0 if
+            it is not known.
+
     Attributes:
         hop: Samples in a hop.
         blind: Whether the newest sample has no displacement.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, nominal: float = 0.0) -> None:
         """Begin with nothing held."""
         self.hop = 1
+        self._nominal, self._told = nominal, False
+        self._pulses: PulseAngle | None = None
         self._held: list[Array] = []
         self._count = 0
         self._step = math.nan
@@ -160,8 +169,11 @@ class Framer:
         if _unbroken(first, self._last, self._step, self._dead) < _RATE_SAMPLES:
             return None
         rate, sensors = 1.0 / self._step, self._sensors
-        self._filter = MotionFilter(sensors.orders, rate) if sensors.filtered else None
-        return StreamFormat(rate, not self._dead[1], not self._dead[2:].any(), sensors.mixed)
+        # Where no turn is seen nothing else takes away the mean.
+        filtered = sensors.filtered or bool(self._dead[1])
+        self._filter = MotionFilter(sensors.orders, rate) if filtered else None
+        angle, workpiece = not self._dead[1], not self._dead[2:].any()
+        return StreamFormat(rate, angle, workpiece, sensors.mixed, self._told)
 
     def _drop_to_break(self, rows: Array, at: int) -> tuple[bool, Array]:
         """Drop what is held up to the break; a stretch begins with the next sample."""
@@ -190,7 +202,8 @@ class Framer:
                 raise LayoutError(
                     f'The samples have no column {lacking}, only {", ".join(names)}.'
                 )
-            wanted = (_TIME, _ANGLE, sensors.tool, sensors.workpiece)
+            spindle = _PULSE if _PULSE in names and _ANGLE not in names else _ANGLE
+            wanted = (_TIME, spindle, sensors.tool, sensors.workpiece)
             places = [names.index(name) if name in names else -1 for name in wanted]
             if self._sensors != sensors:
                 self._sensors = sensors
@@ -198,6 +211,8 @@ class Framer:
             self._names, self._places = names, np.array([*places, 0])
             self._incomplete = min(places) < 0
             self._labels = tuple(name if name in names else '' for name in wanted[1:])
+            self._pulses = PulseAngle() if spindle == _PULSE else None
+            self._told = self._nominal > 0.0 and places[1] < 0
         if samples.ndim != 2 or samples.shape[1] != len(names):
             raise LayoutError(
                 f'A block of samples for {len(names)} columns has the shape {samples.shape}.'
@@ -205,6 +220,10 @@ class Framer:
         found: Array = samples.take(self._places, axis=1)
         if self._incomplete:
             found[:, self._places < 0] = math.nan
+        if self._pulses is not None:
+            found[:, 1] = self._pulses.take(found[:, 0], found[:, 1])
+        elif self._told:
+            found[:, 1] = self._nominal * found[:, 0]
         if len(found):
             self._causes = watch_channels(found, self._channels)
             tool, workpiece = found[-1, 2:4].tolist()

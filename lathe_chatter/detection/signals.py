@@ -55,7 +55,7 @@ SETTINGS = record_type(
 """How samples are read and judged: sample rate, Hz; length of a hop, s; gain of the band pass;
 stiffness, N/m; amplitude from which on the spindle's own vibration is told, m; slowest speed,
 rev/s. Samples in a hop and in a thinned sample, thinned samples in an output; what is
-there, and whether the machine is believed."""
+there (2: an angle from a speed that is only nominal), and whether the machine is believed."""
 
 
 class Memory(NamedTuple):
@@ -179,19 +179,21 @@ def _take_products(
     history: Array, first: int, kernels: Kernels, settings: Any, products: Any, fit: FitSums
 ) -> None:
     """Multiply the newest samples by the kernels and add up."""
+    products.outputs += 1.0
+    if settings.has_machine == 0:
+        return
     force = chip = tool = pull = place = slope = free = 0j
     for i in range(kernels.band.size):
         change = history[TOOL_CHANGE, first + i]
         tool += kernels.band[i] * change
-        if settings.has_machine != 0:
-            moved = change - history[CHIP, first + i]
-            freed = history[TOOL_FREE, first + i]
-            force += kernels.force[i] * freed
-            slope += kernels.slope[i] * freed
-            free += kernels.band[i] * freed
-            chip += kernels.band[i] * history[CHIP_FREE, first + i]
-            pull += kernels.force[i] * change - kernels.inertia[i] * moved
-            place += kernels.band[i] * moved
+        moved = change - history[CHIP, first + i]
+        freed = history[TOOL_FREE, first + i]
+        force += kernels.force[i] * freed
+        slope += kernels.slope[i] * freed
+        free += kernels.band[i] * freed
+        chip += kernels.band[i] * history[CHIP_FREE, first + i]
+        pull += kernels.force[i] * change - kernels.inertia[i] * moved
+        place += kernels.band[i] * moved
     products.force_force += force.real**2 + force.imag**2
     products.force_chip += force.real * chip.real + force.imag * chip.imag
     products.chip_chip += chip.real**2 + chip.imag**2
@@ -199,9 +201,7 @@ def _take_products(
     products.pull_workpiece += pull.real * place.real + pull.imag * place.imag
     products.workpiece_workpiece += place.real**2 + place.imag**2
     products.tool_power += tool.real**2 + tool.imag**2
-    products.outputs += 1.0
-    if settings.has_machine != 0:
-        add_output(fit, force, slope, free, place, chip)
+    add_output(fit, force, slope, free, place, chip)
 
 
 @compiled(inner=True)
@@ -266,7 +266,7 @@ def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, produc
             counts.first_angle = history[ANGLE, n]
         counts.filled = n + 1
         products.tool_mean += history[TOOL, n] * thinning / block.shape[0]
-        if settings.has_angle != 0 and n > 0:
+        if settings.has_angle == 1 and n > 0:
             _take_phase(history, n, memory.phases)
         if not _take_changes(history, counts, settings):
             continue

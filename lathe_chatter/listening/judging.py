@@ -64,12 +64,13 @@ def judge(
     Raises:
         LayoutError: If there is nothing in it that can be listened to.
     """
-    count = max(1, round(_BLOCK * signals.rate))
+    rate = signals.rate
+    count = max(1, round(_BLOCK * rate))
     found = []
     for begin in range(0, len(signals.samples), count):
         block = signals.samples[begin : begin + count]
         found.append(detector.update(block, signals.columns))
-        progress(len(block) / signals.rate)
+        progress(len(block) / rate)
     return Judged(tuple(found))
 
 
@@ -116,7 +117,8 @@ class Score:
 
     Attributes:
         f1: Of the labelled seconds: harmonic mean of what part of the flagged was chatter, and
-            what part of the chatter was flagged; nan without chatter.
+            what part of the chatter was flagged; nan without chatter and without a flag.
+        event_f1: The same of the stretches of chatter.
         seconds: That are labelled.
         events: Stretches of chatter.
         found: Of them that were flagged.
@@ -126,6 +128,7 @@ class Score:
     """
 
     f1: float
+    event_f1: float
     seconds: float
     events: int
     found: int
@@ -136,7 +139,11 @@ class Score:
 
 def score(judged: Judged, labels: Sequence[Label]) -> Score:
     """Hold the flag against labels; what has no label does not count."""
-    times, flagged = judged.times, judged.flagged
+    return score_of(judged.times, judged.flagged, labels)
+
+
+def score_of(times: Array, flagged: NDArray[np.bool_], labels: Sequence[Label]) -> Score:
+    """The same of a flag at some times, s (n,) both; a time that is no number is left out."""
     known = np.isfinite(times)
     times, flagged = times[known], flagged[known]
     labelled, chatter = np.zeros(len(times), bool), np.zeros(len(times), bool)
@@ -149,17 +156,22 @@ def score(judged: Judged, labels: Sequence[Label]) -> Score:
             raised = times[inside & flagged]
             if len(raised):
                 delays.append(float(raised[0]) - label.start)
-    right = int(np.sum(flagged & chatter))
-    wrong = int(np.sum((flagged != chatter) & labelled))
     rises = np.flatnonzero(flagged & ~np.r_[False, flagged[:-1]])
     near = [any(label.start <= times[k] <= label.end + _LATE for label in events) for k in rises]
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    false = int(np.sum(labelled[rises] & ~np.array(near, bool))) if len(rises) else 0
     return Score(
-        2 * right / (2 * right + wrong) if events else math.nan,
+        f1_of(int(np.sum(flagged & chatter)), int(np.sum((flagged != chatter) & labelled))),
+        f1_of(len(delays), len(events) - len(delays) + false),
         float(labelled.sum()) * period,
         len(events),
         len(delays),
         float(np.median(delays)) if delays else math.nan,
-        int(np.sum(labelled[rises] & ~np.array(near, bool))) if len(rises) else 0,
+        false,
         float((labelled & ~chatter).sum()) * period / 3600.0,
     )
+
+
+def f1_of(right: int, wrong: int) -> float:
+    """Harmonic mean of precision and recall: what was found, and what was missed or invented."""
+    return 2 * right / (2 * right + wrong) if right + wrong else math.nan

@@ -230,8 +230,14 @@ class MonitorNode(ParameterNode):
             self._detector.set_machine(machine)
 
     def _new_detector(self) -> ChatterDetector:
-        speeds = float(self.values['slowest_speed']), float(self.values['fastest_speed'])  # type: ignore[arg-type]  # numbers
-        return ChatterDetector(self.machine, speed_range=speeds)
+        numbers = {name: value for name, value in self.values.items() if isinstance(value, float)}
+        return ChatterDetector(
+            self.machine,
+            speed_range=(numbers['slowest_speed'], numbers['fastest_speed']),
+            lowest_frequency=numbers['lowest_frequency'],
+            highest_frequency=numbers['highest_frequency'],
+            nominal_rpm=numbers['spindle_speed_rpm'],
+        )
 
     def finish(self) -> None:
         """Say what is still to be said."""

@@ -25,7 +25,10 @@ from lathe_chatter.supervisor import Limits, Mode
 __all__ = ['LATHE', 'MONITOR', 'PAGE', 'RECORDER', 'SUPERVISOR', 'ModelSource']
 
 _SPEED_RANGE = ('slowest_speed', 'fastest_speed')
+_BAND = ('lowest_frequency', 'highest_frequency')
 _ADVISED = limits_of(Cut, 'spindle_speed_rpm')
+_NOMINAL = Quantity('', 'rev/min', low=_ADVISED.low, high=_ADVISED.high, or_zero=True)
+_HEARD = Quantity('', 'Hz', high=50_000.0)
 
 
 def _derived_monitor(given: Values) -> Resolved:
@@ -37,6 +40,9 @@ def _derived_monitor(given: Values) -> Resolved:
     if slowest >= fastest:
         allowed = f'above slowest_speed, which is {slowest:g} rev/min'
         raise ParameterError('fastest_speed', fastest, 'rev/min', allowed)
+    lowest, highest = (float(given.get(name, 0.0)) for name in _BAND)  # type: ignore[arg-type]  # checked numbers
+    if highest > 0.0 and lowest >= highest:
+        raise ParameterError(_BAND[1], highest, 'Hz', f'0, or above {_BAND[0]}, {lowest:g} Hz')
     source = given.get('model', MONITOR['model'].default)
     if source == ModelSource.AUTO.value:
         own = {MACHINE_FILE.name, *(row.name for row in MACHINE_ROWS)} & given.keys()
@@ -66,6 +72,24 @@ MONITOR = ParameterTable(
         *MACHINE_ROWS,
         Row('slowest_speed', 60.0, 'slowest spindle speed to recommend', _ADVISED),
         Row('fastest_speed', 30000.0, 'fastest spindle speed to recommend', _ADVISED),
+        Row(
+            'lowest_frequency',
+            0.0,
+            'lowest frequency at which chatter is looked for where no machine is known; 0: 20 Hz',
+            _HEARD,
+        ),
+        Row(
+            'highest_frequency',
+            0.0,
+            'the highest; 0: 5 kHz, or as far as the sample rate allows',
+            _HEARD,
+        ),
+        Row(
+            'spindle_speed_rpm',
+            0.0,
+            'nominal spindle speed, for samples without an angle or a pulse a turn; 0: unknown',
+            _NOMINAL,
+        ),
     ),
     _derived_monitor,
 )

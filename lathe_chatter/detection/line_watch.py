@@ -1,0 +1,93 @@
+"""A line that stands above everything else that is heard: chatter that nobody heard begin.
+
+Where the spindle is not seen, or sound is all there is, the rise of a vibration tells little: a
+cut that begins is louder too. But chatter is one tone that holds nearly all the power, and keeps
+its amplitude, where cutting and an idle machine have many lines, and a mode that noise excites
+swells and fades. Nor does a rise of energy raise an alarm here but where a line holds the power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lathe_chatter.arrays import Array
+from lathe_chatter.detection.band_judge import BandJudge
+
+_SHARE, _GONE = 0.45, 0.3
+"""Part of all power in the line that makes an alarm, and below which it is over."""
+_UNSTEADY = 0.6
+"""Standard deviation of its power over the mean; 1 for noise in a mode."""
+_PRESENT = 0.2
+"""Part of its mean power that a line must have now: what has ended stands in the mean for long."""
+_LOOKS, _LOOKS_GONE = 3, 4
+"""Looks in a row that must find it, and that must find none any more."""
+_OTHER = 0.08
+"""Part by which a line is another line: chatter keeps its frequency."""
+
+
+class LineWatch:
+    """Looks for the line over the bands of a few judges, and raises the alarm of its band.
+
+    Args:
+        judges: Of the bands, rising; they raise no alarm by themselves any more.
+        strictness: The score that makes an alarm.
+    """
+
+    def __init__(self, judges: Sequence[BandJudge], strictness: float) -> None:
+        """Nothing found."""
+        self._judges = judges
+        self._strictness = strictness
+        for judge in judges:
+            judge.state.now[0].strictness = np.inf
+        self._weights = [judge.line_weights for judge in judges]
+        self._found, self._hertz = 0, 0.0
+
+    def look(self) -> None:
+        """Look, after hops were judged."""
+        powers = [j.state.line[0] * w for j, w in zip(self._judges, self._weights, strict=True)]
+        heard = zip(self._judges, powers, strict=True)
+        total = sum(float(power.sum()) / judge.overlap for judge, power in heard)
+        if not total > 0.0:
+            return
+        best = max(range(len(powers)), key=lambda k: float(powers[k].max()))
+        place = int(powers[best].argmax())
+        share = _with_neighbour(powers[best], place) / total
+        self._weigh(self._judges[best], place, share)
+        for k, judge in enumerate(self._judges):
+            now = judge.state.now[0]
+            if k == best and share > _GONE and self._is_same(self._judges[best].centres[place]):
+                now.line_gone = 0
+            elif now.alarmed:
+                now.line_gone += 1
+                if now.line_gone >= _LOOKS_GONE:
+                    judge.end_alarm()
+
+    def _is_same(self, hertz: float) -> bool:
+        """Whether this is the frequency of the line that was found last."""
+        return bool(abs(hertz - self._hertz) < _OTHER * hertz)
+
+    def _weigh(self, judge: BandJudge, place: int, share: float) -> None:
+        """Raise the alarm where the loudest line, in a resonator of a judge, is chatter."""
+        if share < _SHARE or not judge.line_known(place):
+            self._found = 0
+            return
+        now, hertz = judge.state.now[0], float(judge.centres[place])
+        mean, square = judge.state.line[:, place]
+        steady = square < (1.0 + _UNSTEADY**2) * mean**2
+        if not self._is_same(hertz):
+            self._found, self._hertz = 0, hertz
+        risen = now.score >= self._strictness
+        present = abs(judge.state.motion[now.newest, place]) ** 2 > _PRESENT * mean
+        change = 1 if present and (steady or risen) else -1
+        self._found = min(max(self._found + change, 0), _LOOKS)
+        if self._found >= _LOOKS and not now.by_line:
+            judge.raise_by_line()
+
+
+def _with_neighbour(power: Array, place: int) -> float:
+    """A line's power where it falls between two resonators: that of both."""
+    below = float(power[place - 1]) if place > 0 else 0.0
+    above = float(power[place + 1]) if place + 1 < power.size else 0.0
+    return float(power[place]) + max(below, above)
