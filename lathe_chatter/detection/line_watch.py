@@ -15,10 +15,13 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.detection.band_judge import BandJudge
 
-_SHARE, _GONE = 0.45, 0.3
+_SHARE, _GONE = 0.55, 0.3
 """Part of all power in the line that makes an alarm, and below which it is over."""
 _UNSTEADY = 0.6
 """Standard deviation of its power over the mean; 1 for noise in a mode."""
+_QUIET, _FORGETTING = 0.1, 1e-3
+"""Part of the loudest that was heard, below which nothing is cut: a hum that is left alone there
+is no chatter; and what of the loudest a look forgets."""
 _PRESENT = 0.2
 """Part of its mean power that a line must have now: what has ended stands in the mean for long."""
 _LOOKS, _LOOKS_GONE = 3, 4
@@ -42,7 +45,7 @@ class LineWatch:
         for judge in judges:
             judge.state.now[0].strictness = np.inf
         self._weights = [judge.line_weights for judge in judges]
-        self._found, self._hertz = 0, 0.0
+        self._found, self._hertz, self._loudest = 0, 0.0, 0.0
 
     def look(self) -> None:
         """Look, after hops were judged."""
@@ -51,10 +54,12 @@ class LineWatch:
         total = sum(float(power.sum()) / judge.overlap for judge, power in heard)
         if not total > 0.0:
             return
+        self._loudest = max((1.0 - _FORGETTING) * self._loudest, total)
         best = max(range(len(powers)), key=lambda k: float(powers[k].max()))
         place = int(powers[best].argmax())
         share = _with_neighbour(powers[best], place) / total
-        self._weigh(self._judges[best], place, share)
+        audible = total > _QUIET * self._loudest
+        self._weigh(self._judges[best], place, share if audible else 0.0)
         for k, judge in enumerate(self._judges):
             now = judge.state.now[0]
             if k == best and share > _GONE and self._is_same(self._judges[best].centres[place]):
