@@ -206,7 +206,8 @@ def _world_of_size(k: int, seed: int, *, told: bool) -> World:
     limit = critical_depth(machine, rpm, seated=False)
     micron = 1e-6 * machine.tool.stiffness  # N that push the tool by a micrometre
     around = Surroundings(
-        force_noise=(0.02 * micron) ** 2 / hertz, sensor_noise=3e-8, runout=(2e-6, 1e-6),
+        force_noise=(0.02 * micron) ** 2 / hertz, sensor_noise=3e-8, chip=5e-5,
+        runout=(2e-6, 1e-6),
         unbalance=0.0, rate=rate, machine=machine,
     )  # fmt: skip
     depths = tuple(float(d) for d in rng.uniform(0.4 * limit, 0.9 * limit, 2))
