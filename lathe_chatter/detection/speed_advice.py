@@ -22,6 +22,8 @@ _SHARE = 0.98
 _MOST = 3
 _SAME = 0.02
 """Part by which speeds may differ that come from one cut, identified twice."""
+_ANOTHER_SPEED = 0.01
+"""Part by which a speed must differ from the one that was advised for to be another."""
 _RULE_HOLDS = 0.3
 """Part of the speeds by the rule of thumb that are stable; benchmarks/detection prints it."""
 _SOME_DEPTH = 1e-3
@@ -71,11 +73,28 @@ class Advice:
         depth_factor: What the depth has to be multiplied by to be stable, where no speed helps;
             1 otherwise, nan where nothing is known.
         depth_speed_rpm: The speed that goes with the reduced depth, rev/min.
+        found_at_rpm: The speed at which the cut chattered that it is for, rev/min.
     """
 
     speeds: tuple[AdvisedSpeed, ...] = ()
     depth_factor: float = math.nan
     depth_speed_rpm: float = math.nan
+    found_at_rpm: float = math.nan
+
+    def after(self, earlier: Advice, depth: float | None = None) -> str:
+        """What the operator, who has heard the earlier one, has to hear; empty for nothing.
+
+        After a change of speed that was no cure that is also that the advice stands.
+
+        Args:
+            earlier: What was said before.
+            depth: As for `in_words`.
+        """
+        words = self.in_words(depth)
+        if self.differs_from(earlier) or not words:
+            return words
+        moved = abs(self.found_at_rpm / earlier.found_at_rpm - 1.0) > _ANOTHER_SPEED
+        return f'the advice stands: {words}' if moved else ''
 
     def differs_from(self, earlier: Advice) -> bool:
         """Whether it says something, and another thing than the earlier one."""
@@ -273,10 +292,6 @@ def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
     return Advice(tuple(AdvisedSpeed(speed, probability=_RULE_HOLDS) for speed in inside))
 
 
-_ANOTHER_SPEED = 0.01
-"""Part by which a speed must differ from the one that was advised for to be another."""
-
-
 class Identified(NamedTuple):
     """What is known of a cut that chatters.
 
@@ -350,13 +365,14 @@ class SpeedAdviser:
             return  # what was recommended may yet be the cure
         self._advised_at = known.spindle_speed_rpm
         if self.machine is None or not modelled:
-            self.advice = rule_of_thumb(known.frequency, self._speed_range)
+            thumb = rule_of_thumb(known.frequency, self._speed_range)
+            self.advice = replace(thumb, found_at_rpm=known.spindle_speed_rpm)
             return
         if not error < self._error or growth + error < self._surely_grew:
             return
         self._error = error
         self._surely_grew = max(self._surely_grew, growth - error)
-        self.advice = advise(
+        found = advise(
             self.machine,
             known.cutting_stiffness,
             self._speed_range,
@@ -364,6 +380,7 @@ class SpeedAdviser:
             seated=_seated(self.machine, known.workpiece_stiffness),
             cutting_error=known.cutting_error,
         )
+        self.advice = replace(found, found_at_rpm=known.spindle_speed_rpm)
 
 
 def _seated(machine: Machine, stiffness: float) -> bool | None:

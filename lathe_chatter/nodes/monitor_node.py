@@ -270,8 +270,8 @@ class MonitorNode(ParameterNode):
             else:
                 self._say('clearance', clearance(estimate))
             self._logged_advice = estimate.advice
-        elif estimate.advice.differs_from(self._logged_advice):
-            self._say('advice', f'At {estimate.time:.6f} s: {estimate.advice.in_words()}.')
+        elif advice := estimate.advice.after(self._logged_advice):
+            self._say('advice', f'At {estimate.time:.6f} s: {advice}.')
             self._logged_advice = estimate.advice
         if changed:
             self._diagnostics.publish_changes(self._statuses())

@@ -91,7 +91,9 @@ SENTENCES = {
     ),
     'onset': Sentence('warning', _AT + r'chatter .+\.', 'the flag has just been raised'),
     'advice': Sentence(
-        'info', _AT + r'(try|no stable speed) .+\.', 'chatter is flagged, and the advice is new'
+        'info',
+        _AT + r'(the advice stands: )?(try|no stable speed).+\.',
+        'chatter is flagged, and the advice is new, or the same but found at another speed',
     ),
     'clearance': Sentence(
         'info',

@@ -210,7 +210,9 @@ class _Simulation:
         if what:
             self._log(self._lathe.time, what)
             self._told_advice = Advice()
-        if estimate.chatter and estimate.advice.differs_from(self._told_advice):
+        if not estimate.chatter:
+            return
+        words = estimate.advice.after(self._told_advice, self._lathe.cut.depth_of_cut)
+        if words:
             self._told_advice = estimate.advice
-            words = estimate.advice.in_words(self._lathe.cut.depth_of_cut)
             self._log(self._lathe.time, f'advice: {words}')

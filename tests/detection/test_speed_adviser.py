@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.machines import random_machine
 
-from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
@@ -57,6 +57,23 @@ def test_after_a_speed_that_was_no_cure_another_is_recommended() -> None:
     assert after.chatter
     assert after.recommended_speed_rpm != before.recommended_speed_rpm
     assert _growth(Machine(), after.recommended_speed_rpm, depth) < 0.0
+
+
+def test_after_a_speed_that_was_no_cure_it_is_said_that_the_advice_stands() -> None:
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=1.1e-3, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    heard: list[str] = []
+    said = Advice()
+    for speed in (3000.0, 3200.0):  # the second is no cure, and as near to the same one
+        lathe.retune(lathe.cut.with_changes(spindle_speed_rpm=speed))
+        for estimate in _watch(detector, lathe, 2.0):
+            words = estimate.advice.after(said) if estimate.chatter else ''
+            if words:
+                heard.append(f'at {speed:.0f}: {words}')
+                said = estimate.advice
+    assert [words for words in heard if 'at 3200' in words] == [heard[-1]]
+    assert heard[-1].startswith('at 3200: the advice stands: try ')
+    assert not any('stands' in words for words in heard[:-1])
 
 
 def test_nothing_is_recommended_while_the_chatter_dies_down() -> None:
