@@ -13,7 +13,7 @@ from runs import scratch
 
 from lathe_chatter.recording import read_run, verify
 
-_NODES = 'lathe_chatter.nodes'
+_NODES = 'lathe_chatter.nodes.entry_points'
 
 
 def pace(factor: float, seconds: float) -> None:
@@ -22,8 +22,8 @@ def pace(factor: float, seconds: float) -> None:
     os.environ.setdefault('ROS_DOMAIN_ID', '94')
     with scratch() as place:
         run = place / 'recorder'
-        recorder = _node('recorder_node', f'output:={run}')
-        lathe = _node('lathe_node', f'real_time_factor:={factor}', 'await_readers:=1')
+        recorder = _node('run_recorder', f'output:={run}')
+        lathe = _node('lathe', f'real_time_factor:={factor}', 'await_readers:=1')
         _wait(run)
         time.sleep(seconds)
         for process in (lathe, recorder):
@@ -31,7 +31,7 @@ def pace(factor: float, seconds: float) -> None:
             process.wait(60)
         _say(f'recorder, real-time factor {factor:g}', run, seconds)
         run = place / 'record'
-        lathe = _node('lathe_node', 'real_time_factor:=0.0', f'record:={run}')
+        lathe = _node('lathe', 'real_time_factor:=0.0', f'record:={run}')
         _wait(run)
         time.sleep(seconds)
         lathe.send_signal(signal.SIGINT)
@@ -39,9 +39,9 @@ def pace(factor: float, seconds: float) -> None:
         _say('the lathe with `record`, as fast as it can', run, seconds)
 
 
-def _node(module: str, *values: str) -> subprocess.Popen[bytes]:
+def _node(name: str, *values: str) -> subprocess.Popen[bytes]:
     words = [word for value in values for word in ('-p', value)]
-    command = [sys.executable, '-m', f'{_NODES}.{module}', '--ros-args', *words]
+    command = [sys.executable, '-m', _NODES, name, '--ros-args', *words]
     return subprocess.Popen(command, stderr=subprocess.DEVNULL)  # noqa: S603 -- our own
 
 

@@ -22,7 +22,7 @@ _SAMPLES = 30
 """Messages of one topic that no other has before the samples."""
 _STARTED = 60.0
 """s within which a program has begun to write."""
-_LATHE = 'lathe_chatter.nodes.lathe_node'
+_NODES = 'lathe_chatter.nodes.entry_points'
 
 
 def _commands(run: Path) -> dict[str, list[str]]:
@@ -32,9 +32,9 @@ def _commands(run: Path) -> dict[str, list[str]]:
             *node, 'lathe_chatter.cli.main', 'simulate', '--output', str(run),
             '--duration', '9999',
         ],
-        'record': [*node, _LATHE, '--ros-args', '-p', f'record:={run}'],
+        'record': [*node, _NODES, 'lathe', '--ros-args', '-p', f'record:={run}'],
         'recorder': [
-            *node, 'lathe_chatter.nodes.recorder_node', '--ros-args', '-p', f'output:={run}',
+            *node, _NODES, 'run_recorder', '--ros-args', '-p', f'output:={run}',
         ],
     }  # fmt: skip
 
@@ -58,7 +58,7 @@ def programs(count: int) -> None:
     for name in ('recorder', 'record', 'simulate'):
         with scratch() as place:
             if name == 'recorder':
-                with _process([sys.executable, '-m', _LATHE]):
+                with _process([sys.executable, '-m', _NODES, 'lathe']):
                     _kill_often(name, place, (count + 2) // 3, generator)
             else:
                 _kill_often(name, place, (count + 2) // 3, generator)

@@ -14,6 +14,8 @@ from runs import scratch
 from lathe_chatter.precompile import precompile
 from lathe_chatter.recording import verify
 
+_NODES = 'lathe_chatter.nodes.entry_points'
+
 
 def seconds_of(process: subprocess.Popen[bytes]) -> float:
     """Processor time that a process has had, s."""
@@ -33,17 +35,17 @@ def stalls(seconds: float) -> None:
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         }
 
-        def node(module: str, *parameters: str) -> subprocess.Popen[bytes]:
+        def node(name: str, *parameters: str) -> subprocess.Popen[bytes]:
             words = [word for parameter in parameters for word in ('-p', parameter)]
             return subprocess.Popen(  # noqa: S603 -- our own modules
-                [sys.executable, '-m', f'lathe_chatter.nodes.{module}', '--ros-args', *words],
+                [sys.executable, '-m', _NODES, name, '--ros-args', *words],
                 env=environment,
                 stderr=subprocess.DEVNULL,
             )
 
         run = place / 'run'
-        recorder = node('recorder_node', f'output:={run}')
-        others = [node('monitor_node'), node('lathe_node')]
+        recorder = node('run_recorder', f'output:={run}')
+        others = [node('chatter_monitor'), node('lathe')]
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             time.sleep(0.7)

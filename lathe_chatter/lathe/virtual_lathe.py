@@ -20,6 +20,8 @@ from lathe_chatter.samples import sample_columns
 
 IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e6, high=1e6)
 
+_AT_ONCE = 100_000
+"""Samples of one call of the inner loop, within which no signal is answered."""
 _ROOM = 512
 """Nodes of the surface for which there is room at first."""
 
@@ -192,8 +194,10 @@ class VirtualLathe:
         out = np.empty((0 if self.guard else samples, self._columns))
         self._found = []
         rows, status = 0, layout.SURFACE_FULL
-        while status in {layout.SURFACE_FULL, layout.EVENTS_FULL}:
-            done, found, status = self._call(out[rows:])
+        while status in {layout.SURFACE_FULL, layout.EVENTS_FULL} or (
+            rows < len(out) and status != layout.GUARD
+        ):
+            done, found, status = self._call(out[rows : rows + _AT_ONCE])
             rows += done
             if found:
                 self._found.append(self._event_space[:found].copy())

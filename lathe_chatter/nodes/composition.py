@@ -121,7 +121,3 @@ def main() -> None:
     run_node(make, spin=lambda executor, cell, ended: cell.spin(executor, ended), usage=USAGE)
     if cells and cells[0].recorder.failed:
         raise SystemExit(1)
-
-
-if __name__ == '__main__':
-    main()

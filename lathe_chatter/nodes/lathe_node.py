@@ -394,7 +394,3 @@ def main() -> None:
     """Run the node until it is told to end."""
     ask_for_short_slices()
     run_node(lambda: LatheNode(by_timer=False), spin=spin_in_ticks, usage=LATHE.usage('lathe'))
-
-
-if __name__ == '__main__':
-    main()

@@ -374,7 +374,3 @@ def main() -> None:
         spin=spin,
         usage=MONITOR.usage('chatter_monitor'),
     )
-
-
-if __name__ == '__main__':
-    main()

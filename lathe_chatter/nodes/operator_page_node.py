@@ -194,7 +194,3 @@ def main() -> None:
     """Run the node until it is told to end."""
     # The executor driven by events would take away what is polled.
     run_node(OperatorPageNode, by_events=False, spin=_spin, usage=PAGE.usage('operator_page'))
-
-
-if __name__ == '__main__':
-    main()

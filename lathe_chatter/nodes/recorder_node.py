@@ -394,7 +394,3 @@ def main() -> None:
     except RecordingFailedError as error:
         sys.stderr.write(f'{error}\n')
         raise SystemExit(_FAILED) from None
-
-
-if __name__ == '__main__':
-    main()

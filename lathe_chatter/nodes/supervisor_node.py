@@ -320,7 +320,3 @@ def _limits_of(values: Mapping[str, Any]) -> Limits:
 def main() -> None:
     """Run the node until it is told to end."""
     run_node(SupervisorNode, usage=SUPERVISOR.usage('chatter_supervisor'))
-
-
-if __name__ == '__main__':
-    main()

@@ -260,7 +260,7 @@ def test_a_lathe_that_is_there_already_is_left_alone(
     """Its names would be taken for the run's own: the run is refused, and nothing is changed."""
     scenario = tmp_path / 'short.yaml'
     scenario.write_text(SHORT)
-    node = [sys.executable, '-m', 'lathe_chatter.nodes.lathe_node']
+    node = [sys.executable, '-m', 'lathe_chatter.nodes.entry_points', 'lathe']
     node += ['--ros-args', '-p', 'await_readers:=1']
     with subprocess.Popen(node, env=environment, stderr=subprocess.PIPE, text=True) as foreign:
         assert foreign.stderr is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -387,3 +388,25 @@ def test_two_corners_of_the_surface_at_one_place_are_met_one_after_the_other() -
     went_on = VirtualLathe.continued(doubled).advance(400)
     usual = VirtualLathe.continued(state).advance(400)
     assert went_on == pytest.approx(usual, rel=1e-6, abs=1e-12)
+
+
+def test_a_long_cut_answers_a_signal() -> None:
+    samples = 5_000_000
+
+    def interrupt(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    lathe = VirtualLathe()
+    lathe.advance(10)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.02)
+        with pytest.raises(KeyboardInterrupt):
+            lathe.advance(samples)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert 10 < lathe.samples_taken < samples
+    # What it has cut by then it has cut as ever.
+    whole = VirtualLathe()
+    whole.advance(lathe.samples_taken)
+    assert (lathe.advance(1000) == whole.advance(1000)).all()

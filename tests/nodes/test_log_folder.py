@@ -51,7 +51,13 @@ def test_a_node_starts_all_the_same(lacking: str, domain: int, tmp_path: Path) -
         environment['ROS_LOG_DIR'] = str(tmp_path / 'file')
     done = subprocess.run(
         [
-            *(sys.executable, '-m', 'lathe_chatter.nodes.recorder_node', '--ros-args'),
+            *(
+                sys.executable,
+                '-m',
+                'lathe_chatter.nodes.entry_points',
+                'run_recorder',
+                '--ros-args',
+            ),
             *('-p', f'output:={tmp_path / "file"}'),  # refused, once it has started
         ],
         env=environment,

@@ -15,11 +15,11 @@ from std_msgs.msg import Float64MultiArray, String
 from support.node_bench import LATCHED, Bench
 from support.node_processes import NODES
 
+from lathe_chatter.nodes import entry_points
 from lathe_chatter.nodes.parameters import MONITOR as TABLE
 from lathe_chatter.precompile import precompile
 
-LATHE = 'lathe_chatter.nodes.lathe_node'
-MONITOR = 'lathe_chatter.nodes.monitor_node'
+LATHE, MONITOR = 'lathe', 'chatter_monitor'
 WRONG = {
     (LATHE, 'depth_of_cut:=nan'): (
         'depth_of_cut is nan m: it must be a finite number from 0 to 0.1 m.'
@@ -46,10 +46,10 @@ WRONG = {
 }
 
 
-def start(module: str, *parameters: str, more: Sequence[str] = ()) -> subprocess.Popen[str]:
+def start(node: str, *parameters: str, more: Sequence[str] = ()) -> subprocess.Popen[str]:
     words = [word for parameter in parameters for word in ('-p', parameter)]
     return subprocess.Popen(
-        [sys.executable, '-m', module, '--ros-args', *words, *more],
+        [*NODES, node, '--ros-args', *words, *more],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -67,7 +67,7 @@ def test_a_wrong_parameter_at_the_start_is_one_sentence_that_names_it() -> None:
 
 
 def test_a_node_explains_itself_and_takes_no_word_that_it_does_not_know() -> None:
-    command = [sys.executable, '-m', LATHE]
+    command = [*NODES, LATHE]
     told = subprocess.run(
         [*command, '--help'], check=False, capture_output=True, text=True, timeout=60
     )
@@ -117,6 +117,13 @@ def test_a_signal_ends_every_node_with_exit_0(
         _, err = process.communicate(timeout=60)
         assert process.returncode == 0
         assert 'Traceback' not in err
+
+
+def test_a_node_is_started_by_its_entry_point_alone() -> None:
+    """Started as a module it would not hear a signal while it imports others."""
+    files = sorted(Path(entry_points.__file__).parent.glob('*.py'))
+    assert len(files) > 30
+    assert [file.stem for file in files if '__main__' in file.read_text()] == ['entry_points']
 
 
 def hears(process: subprocess.Popen[str]) -> bool:

@@ -106,7 +106,14 @@ def test_a_signal_ends_it_with_exit_0_and_a_finished_run(
     parameters = [f'output:={tmp_path / "run"}', 'topics:=[/n]']
     words = [word for parameter in parameters for word in ('-p', parameter)]
     process = subprocess.Popen(
-        [sys.executable, '-m', 'lathe_chatter.nodes.recorder_node', '--ros-args', *words],
+        [
+            sys.executable,
+            '-m',
+            'lathe_chatter.nodes.entry_points',
+            'run_recorder',
+            '--ros-args',
+            *words,
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -125,7 +132,7 @@ def test_a_signal_ends_it_with_exit_0_and_a_finished_run(
 def test_an_existing_folder_at_the_start_of_the_process_is_one_sentence(tmp_path: Path) -> None:
     done = subprocess.run(
         [
-            sys.executable, '-m', 'lathe_chatter.nodes.recorder_node',
+            sys.executable, '-m', 'lathe_chatter.nodes.entry_points', 'run_recorder',
             '--ros-args', '-p', f'output:={tmp_path}',
         ],
         capture_output=True, text=True, check=False, timeout=60,
@@ -234,7 +241,14 @@ def recorder_process(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[
         given = [f'output:={tmp_path / "run"}', 'topics:=[/n]', *parameters]
         words = [word for parameter in given for word in ('-p', parameter)]
         process = subprocess.Popen(
-            [sys.executable, '-m', 'lathe_chatter.nodes.recorder_node', '--ros-args', *words],
+            [
+                sys.executable,
+                '-m',
+                'lathe_chatter.nodes.entry_points',
+                'run_recorder',
+                '--ros-args',
+                *words,
+            ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
