@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import Any
 
+from lathe_chatter.nodes.deferred_signals import raise_lost_interrupts_again
+
 USER_ERROR = 2
 INTERRUPTED = 130
 _BROKEN_PIPE = 128 + 13
@@ -33,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     received: list[int] = []
     ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = {each: signal.getsignal(each) for each in ends}
+    unraisable = raise_lost_interrupts_again()
     # One that is ignored, as under nohup, stays so.
     heard = [each for each in ends if before[each] != signal.SIG_IGN]
 
@@ -64,6 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         code = INTERRUPTED
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = unraisable
         for each in heard:
             signal.signal(each, before[each])
     return 128 + received[0] if code == INTERRUPTED and received else code

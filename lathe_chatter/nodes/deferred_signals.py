@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+from collections.abc import Callable
 from types import FrameType
+from typing import Any
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_AGAIN = 0.02
+"""s after which an interrupt that was lost is raised again."""
 
 
 def exit_on_end_signals() -> None:
@@ -20,8 +25,35 @@ def exit_on_end_signals() -> None:
             signal.signal(number, lambda _number, _frame: os._exit(0))
 
 
+def raise_lost_interrupts_again() -> Callable[[Any], object]:
+    """From now on a KeyboardInterrupt that Python could only ignore is raised again soon.
+
+    Numba has LLVM call Python for each function that it loads: what is raised in such a call
+    goes nowhere, and neither does what is raised in a `__del__`.
+
+    Returns:
+        What was `sys.unraisablehook` until now.
+    """
+    usual = sys.unraisablehook
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    def hook(lost: Any) -> None:
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            signal.signal(signal.SIGALRM, interrupt)
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        else:
+            usual(lost)
+
+    sys.unraisablehook = hook
+    return usual
+
+
 def raise_on_end_signals() -> list[int]:
     """From now on each of them raises KeyboardInterrupt; one that is ignored, as under nohup, not.
+
+    Where it is lost it is raised again.
 
     Returns:
         The numbers of those that came, as they come.
@@ -35,11 +67,13 @@ def raise_on_end_signals() -> list[int]:
     for number in END_SIGNALS:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
+    raise_lost_interrupts_again()
     return came
 
 
 def ignore_end_signals() -> None:
     """From now on none of them does anything: what they ask for is under way."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
     for number in END_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 

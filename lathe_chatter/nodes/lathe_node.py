@@ -168,7 +168,7 @@ class LatheNode(ParameterNode):
         if self._free:
             self._cut_freely(now)
             return
-        overruns = self._pacer.overruns
+        overruns, behind = self._pacer.overruns, self._meter.behind
         due = self._pacer.due(now)
         self._meter.note_lateness(self._pacer.lateness(now))
         self._make(due)
@@ -177,7 +177,8 @@ class LatheNode(ParameterNode):
                 f'Behind: {self._pacer.lag / SECOND:.3f} s of simulated time given up so far.',
                 'behind',
             )
-            self._diagnostics.publish_changes(self._statuses())
+            if not behind:  # else that is known, and to say it would take more time
+                self._diagnostics.publish_changes(self._statuses())
 
     def _make(self, ticks: int) -> None:
         """Make ticks that are due, until the time for one go is over."""

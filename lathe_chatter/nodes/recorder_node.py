@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,10 @@ from lathe_chatter.recording.snapshot import SnapshotBuffer
 
 _COMMIT_PERIOD = 0.2
 """s between two commits: with the time that one takes it is what a kill can lose."""
-_TAKE_PERIOD = 0.02
+_TAKE_PERIOD = 0.04
 """s between two times that what has arrived is taken."""
+_SERVE_PERIOD = 40_000_000
+"""ns from one look for requests to the next: a look costs more than what has arrived by then."""
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
 _NEWS_PERIOD = 10.0
@@ -181,7 +184,7 @@ class RecorderNode(ParameterNode):
         """Finish the run, with everything that has arrived."""
         if self._watch is None or (self._writer is None and self._snapshot is None):
             return _NOTHING
-        self._look()  # who came a moment ago is no riddle later
+        self._look(closely=True)  # who came a moment ago is no riddle later
         self._log_news(last=True)
         self._watch.end()
         if self._snapshot is not None:
@@ -267,10 +270,10 @@ class RecorderNode(ParameterNode):
 
     # -- what comes ------------------------------------------------------------------------
 
-    def _look(self) -> None:
+    def _look(self, *, closely: bool = False) -> None:
         """Follow the graph: topics and nodes that have appeared."""
         if self._watch is not None and (self._writer or self._snapshot is not None):
-            self._watch.look(self._remote.want)
+            self._watch.look(self._remote.want, closely=closely)
             self._remote.look()
 
     def _take(self) -> None:
@@ -388,7 +391,7 @@ def main() -> None:
         run_node(
             lambda: RecorderNode(by_timer=False),
             by_events=False,
-            spin=spin_in_ticks,
+            spin=partial(spin_in_ticks, serve_period=_SERVE_PERIOD),
             usage=RECORDER.usage('run_recorder'),
         )
     except RecordingFailedError as error:

@@ -21,6 +21,8 @@ from lathe_chatter.recording.provenance import PUBLISHERS
 
 ALWAYS = ('/rosout', '/parameter_events')
 """Topics that are recorded in a pause as well: without them its end would be a riddle."""
+_LOOK_CLOSELY = 0.5
+"""s after which the publishers of a topic are looked at even if they are as many as before."""
 _DISCOVERY = 1.0
 """s after the start of a recording: what is found by then may have been there before."""
 
@@ -112,17 +114,27 @@ class TopicWatch:
         self.paused = False
         self._former: dict[str, dict[str, int]] = {}
         self._met: dict[str, set[tuple[int, ...]]] = {}
+        self._counts: dict[str, int] = {}
+        self._look_closely = 0.0
         self._since, self._began = time.time_ns(), time.monotonic()
 
-    def look(self, on_publisher: Callable[[str, str], None]) -> None:
+    def look(self, on_publisher: Callable[[str, str], None], *, closely: bool = False) -> None:
         """Subscribe to what has appeared, and follow the others.
 
         Args:
             on_publisher: Takes namespace and name of every node that publishes a wanted topic.
+            closely: Whether to ask who publishes, and not only how many do; sometimes it does.
         """
         open_ended = self._wanted.every or self._wanted.like
         there = self._node.get_topic_names_and_types() if open_ended else ()
+        closely = closely or time.monotonic() >= self._look_closely
+        if closely:
+            self._look_closely = time.monotonic() + _LOOK_CLOSELY
         for name in self._wanted.among(name for name, _ in there):
+            count = self._node.count_publishers(name)  # a tenth of what it costs to ask who
+            if not closely and count == self._counts.get(name, 0):
+                continue
+            self._counts[name] = count
             offers = self._node.get_publishers_info_by_topic(name)
             met = self._met.setdefault(name, set())
             known = len(met)

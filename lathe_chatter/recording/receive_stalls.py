@@ -5,7 +5,7 @@ from __future__ import annotations
 from lathe_chatter.recording.provenance import STALLS
 
 _STALL = 0.1
-"""s between two times that messages are taken which count as a stall; usual are 0.02 s."""
+"""s between two times that messages are taken which count as a stall; usual are 0.04 s."""
 
 
 class ReceiveStalls:

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -68,3 +70,31 @@ def test_a_signal_that_is_ignored_stays_ignored() -> None:
         os.kill(os.getpid(), signal.SIGHUP)
         held.deliver()
     assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+
+
+LOST = """
+import ctypes, os, signal, sys, time
+from lathe_chatter.nodes.deferred_signals import ignore_end_signals, raise_on_end_signals
+raise_on_end_signals()
+
+@ctypes.CFUNCTYPE(None)
+def called_from_c():
+    os.kill(os.getpid(), signal.SIGTERM)
+
+try:
+    called_from_c()  # as LLVM calls Numba: what is raised there is ignored
+    end = time.monotonic() + 20.0
+    while time.monotonic() < end:
+        pass
+    print('lost')
+except KeyboardInterrupt:
+    ignore_end_signals()
+    print('heard')
+"""
+
+
+def test_an_interrupt_that_is_lost_in_a_call_from_c_is_raised_again() -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', LOST], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.stdout, done.stderr) == ('heard\n', '')
