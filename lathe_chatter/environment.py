@@ -19,6 +19,7 @@ gymnasium = optional('gymnasium', 'A lathe to be learnt')
 _CUT = Cut(bearing_contact=BearingContact.NONE, force_noise=1e-3, sensor_noise=1e-7)
 _LOW, _HIGH = np.array([2000.0, 1e-4, 2e-5]), np.array([6000.0, 1.5e-3, 1e-4])
 _NAMES = ('spindle_speed_rpm', 'depth_of_cut', 'feed_per_revolution')
+_RATE = Quantity('', 'Hz', low=1.0, high=50.0)
 _LEVELS = 200.0  # settings that differ by less than a level of their range are the same
 
 
@@ -44,12 +45,12 @@ class LatheEnv(gymnasium.Env):  # type: ignore[misc, name-defined]  # of no type
         cut: Cut = _CUT,
     ) -> None:
         """See the class."""
-        self._samples = round(1e4 / Quantity('', 'Hz', low=1.0, high=50.0).check('rate', rate))
+        self._samples = round(1e4 / _RATE.check('rate', rate))
         self._known, self._cut = uncertainty_from(errors, Machine()), cut
         self._steps, self._damage = steps, damage
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
-        shape = (2 * self._samples + 3,)
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+        seen = (2 * self._samples + 3,)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, seen, np.float32)
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Array, Any]:
         """Another machine, cutting gently."""
@@ -58,7 +59,7 @@ class LatheEnv(gymnasium.Env):  # type: ignore[misc, name-defined]  # of no type
         ((machine,), _) = self._known.draw(Machine(), 1, drawn)
         self.lathe, self._left = VirtualLathe(machine, seed=noise), self._steps + 1
         self._set: Array = np.full(3, np.nan)
-        observation, _, _, _, info = self.step(np.full(3, -1.0))
+        observation, *_, info = self.step(np.full(3, -1.0))
         return observation, info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -74,8 +75,7 @@ class LatheEnv(gymnasium.Env):  # type: ignore[misc, name-defined]  # of no type
         seen[-3:] = 2.0 * levels - 1.0
         removed = cut.spindle_speed_rpm * cut.depth_of_cut * cut.feed / _HIGH.prod()
         scatter = min(samples[:, 6].std() / cut.feed, 1.0) if len(samples) else 1.0
-        self._left -= 1
-        reward = float(removed - self._damage * scatter)
+        reward, self._left = float(removed - self._damage * scatter), self._left - 1
         return seen, reward, bool(self.lathe.guard), self._left <= 0, {'samples': samples}
 
 
@@ -89,15 +89,12 @@ class MonitorPolicy:
 
     def __call__(self, info: dict[str, Any]) -> Array:
         """The next action, after what the sensors gave; once for each step."""
-        told = self._detector.update(info['samples'], SAMPLE_COLUMNS)
-        self._wait -= 1
-        if self._wait < 0 and told.chatter:
-            if told.advice.speeds and self._wanted[0] != told.recommended_speed_rpm:
-                self._wanted[0] = told.recommended_speed_rpm
-            else:
-                self._wanted[1] *= 0.85
-            self._wait = 25
-        elif self._wait < 0 and told.state == 'stable':
+        found, self._wait = self._detector.update(info['samples'], SAMPLE_COLUMNS), self._wait - 1
+        if self._wait < 0 and found.chatter:
+            another = found.advice.speeds and self._wanted[0] != found.recommended_speed_rpm
+            depth = self._wanted[1] * (1.0 if another else 0.85)
+            speed = found.recommended_speed_rpm if another else self._wanted[0]
+            self._wanted[:2], self._wait = (speed, depth), 25
+        elif self._wait < 0 and found.state == 'stable':
             self._wanted[1], self._wait = 1.05 * self._wanted[1], 5
-        action: Array = 2.0 * (self._wanted - _LOW) / (_HIGH - _LOW) - 1.0
-        return np.clip(action, -1.0, 1.0)
+        return np.asarray(np.clip(2.0 * (self._wanted - _LOW) / (_HIGH - _LOW) - 1.0, -1.0, 1.0))

@@ -129,8 +129,7 @@ def cores() -> int:
 
 def width_of(executor: Executor | None) -> int:
     """How many workers an executor has, as far as it says."""
-    client = getattr(executor, '_client', None)  # Dask's
-    if client is not None:
+    if client := getattr(executor, '_client', None):  # Dask's
         return max(int(sum(client.nthreads().values())), 1)
     said: int | None = getattr(executor, '_max_workers', None)
     return said or cores()

@@ -40,7 +40,7 @@ class ResultFile:
             whole = path.read_bytes() if path.exists() else b''
             whole = whole[: whole.rfind(b'\n') + 1]
             if whole:
-                self.entries = self._known(whole, header)
+                self.entries = self._known(whole, json.loads(_line(header)))
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open('r+b' if path.exists() else 'wb')
             self._file.truncate(len(whole))  # a last line that was cut off
@@ -54,13 +54,15 @@ class ResultFile:
     def _known(self, whole: bytes, header: Mapping[str, Any]) -> list[dict[str, Any]]:
         try:
             found, *entries = map(json.loads, whole.splitlines())
-        except ValueError:
-            found = None
-        if found != json.loads(_line(header)):
-            raise ResultFileError(
-                f'{self._path} holds another map, or something else: give another file, or '
-                'remove it.'
-            )
+            other = [name for name, value in header.items() if found.get(name) != value]
+        except (ValueError, AttributeError):
+            found, entries, other = {}, [], ['kind']
+        if other == ['code'] and 'code' in found:
+            reason = f'was begun with {found["code"]}, and this is {header["code"]}'
+            raise ResultFileError(f'{self._path} {reason}: go on with that, or name another.')
+        if other:
+            reason = f'holds other results, not of the same {other[0]}'
+            raise ResultFileError(f'{self._path} {reason}: name another, or remove it.')
         return entries
 
     def add(self, entry: Mapping[str, Any]) -> None:

@@ -12,7 +12,7 @@ from lathe_chatter.cli.common_options import add_json, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.executor_options import add_executor, executor_of
 from lathe_chatter.dataset import Plan, load_plan, make_dataset
-from lathe_chatter.dataset.making import Part, make_part, parts_of
+from lathe_chatter.dataset.making import make_part, parts_of
 from lathe_chatter.errors import DatasetError
 from lathe_chatter.executors import cores, width_of
 
@@ -74,7 +74,7 @@ class _Cost(NamedTuple):
 
 def _estimate(plan: Plan) -> _Cost:
     """From the first machine."""
-    one = Part('', range(1))
+    one = ('', range(1))
     make_part(plan, one)  # what is compiled or loaded once does not count
     begin = time.perf_counter()
     files, _ = make_part(plan, one)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lathe_chatter.dataset.plan import OF_FILE, Event, Plan
+from lathe_chatter.dataset.plan import OF_FILE, Plan
+from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
 from lathe_chatter.model.distribution import Distribution
-from lathe_chatter.model.lathe_setup import LatheSetup
-from lathe_chatter.model.machine_file import MachineDescription, load_machine
 from lathe_chatter.model.parameters import MACHINE_FILE
 from lathe_chatter.model.quantities import limits_of
 from lathe_chatter.model.uncertainty import uncertainty_from
@@ -25,86 +24,63 @@ _OF_MACHINE, _OF_RUN = 0, 1
 
 
 @dataclass(frozen=True)
-class DrawnMachine:
-    """One machine of a plan."""
-
-    number: int
-    described: MachineDescription
-    tool_leaves_cut: bool
-
-
-@dataclass(frozen=True)
 class DrawnRun:
-    """One run: what is cut from which sample on, and the knocks on the tool, N s, by sample."""
+    """One run of a machine: what is cut, and the knocks on the tool, N s, from which sample on."""
 
     machine: int
     number: int
-    setup: LatheSetup
+    config: LatheConfig  # as the run begins
     cuts: dict[int, Cut]
     knocks: dict[int, float]
 
 
-def drawn_machine(plan: Plan, number: int) -> DrawnMachine:
+def drawn_machine(plan: Plan, number: int) -> LatheConfig:
     """The machine of a number, which is the same in whatever order they are drawn."""
     rng = np.random.default_rng([plan.seed, _OF_MACHINE, number])
     values = {name: how.draw(rng) for name, how in plan.machine.items()}
-    source, leaves = values.pop(MACHINE_FILE.name, None), values.pop('tool_leaves_cut', True)
-    described = load_machine(plan.files[source]) if source else MachineDescription()
-    if not source:
-        values.setdefault('bearing_stiffness', None)  # the paper's follows the workpiece
-    machine = described.machine
-    for name, value in values.items():
-        part, _, inner = name.rpartition('.')
-        changed = replace(getattr(machine, part), **{inner: value}) if part else value
-        machine = replace(machine, **{part or name: changed})
-    if plan.errors:
-        file = described.uncertainty if plan.errors == OF_FILE else None
-        known = file or uncertainty_from(plan.errors, machine)
-        ((machine,), _) = known.draw(machine, 1, int(rng.integers(2**31)))
-    return DrawnMachine(number, replace(described, machine=machine), leaves)
+    if MACHINE_FILE.name in values:
+        values[MACHINE_FILE.name] = plan.files[values[MACHINE_FILE.name]]
+    steps = {'sample_rate': plan.sample_rate, 'spindle_acceleration': 0.0}
+    config = config_from({**values, **steps})
+    if not plan.errors:
+        return config
+    file = config.described.uncertainty if config.described and plan.errors == OF_FILE else None
+    known = file or uncertainty_from(plan.errors, config.machine)
+    ((machine,), _) = known.draw(config.machine, 1, int(rng.integers(2**31)))
+    return replace(config, setup=replace(config.setup, machine=machine))
 
 
-def drawn_run(plan: Plan, machine: DrawnMachine, number: int) -> DrawnRun:
+def drawn_run(plan: Plan, machine: int, config: LatheConfig, number: int) -> DrawnRun:
     """One run of a machine."""
-    rng = np.random.default_rng([plan.seed, _OF_RUN, machine.number, number])
-    setup = LatheSetup(
-        machine.described.machine,
-        plan.sample_rate,
-        machine.tool_leaves_cut,
-        seed=int(rng.integers(2**31)),
-        accelerometers=any(name in ACCELERATION_COLUMNS for name in plan.columns),
-    )
-    cut = _changed(setup, machine.described.cut, plan.cut, rng)
-    cuts, knocks = {0: cut}, dict[int, float]()
+    rng = np.random.default_rng([plan.seed, _OF_RUN, machine, number])
+    seed, moving = int(rng.integers(2**31)), {*plan.columns} & {*ACCELERATION_COLUMNS}
+    setup = replace(config.setup, seed=seed, accelerometers=bool(moving))
+    config = LatheConfig(setup, _changed(config, config.cut, plan.cut, rng))
+    cut, cuts, knocks = config.cut, {0: config.cut}, dict[int, float]()
     events = [(event.at.draw(rng), event) for event in plan.events if rng.random() < event.share]
     for at, event in sorted(events, key=lambda pair: pair[0]):
         if event.knock is not None:
             knocks[round(at * plan.sample_rate)] = event.knock.draw(rng)
-        after = _changed(setup, cut, event.changes, rng)
-        for time, mixed in _on_the_way(at, event, cut, after):
-            cuts[round(time * plan.sample_rate)] = mixed
+        after = _changed(config, cut, event.changes, rng)
+        for step in range(1, _RAMP if event.over else 0):
+            pairs = [(name, getattr(cut, name), getattr(after, name)) for name in event.changes]
+            mixed = {name: old + step / _RAMP * (new - old) for name, old, new in pairs}
+            time = at + event.over * (step - 1) / (_RAMP - 1)
+            cuts[round(time * plan.sample_rate)] = cut.with_changes(**mixed)
+        if after != cut:
+            cuts[round((at + event.over) * plan.sample_rate)] = after
         cut = after
-    return DrawnRun(machine.number, number, setup, dict(sorted(cuts.items())), knocks)
-
-
-def _on_the_way(at: float, event: Event, cut: Cut, after: Cut) -> Iterator[tuple[float, Cut]]:
-    """What is cut from which time on, s, while an event takes place."""
-    for step in range(1, _RAMP if event.over else 0):
-        pairs = ((name, getattr(cut, name), getattr(after, name)) for name in event.changes)
-        mixed = {name: old + step / _RAMP * (new - old) for name, old, new in pairs}
-        yield at + event.over * (step - 1) / (_RAMP - 1), cut.with_changes(**mixed)
-    if after != cut:
-        yield at + event.over, after
+    return DrawnRun(machine, number, config, dict(sorted(cuts.items())), knocks)
 
 
 def _changed(
-    setup: LatheSetup, cut: Cut, changes: Mapping[str, Distribution], rng: np.random.Generator
+    config: LatheConfig, cut: Cut, changes: Mapping[str, Distribution], rng: np.random.Generator
 ) -> Cut:
     """A cut with values drawn; a depth that is a multiple of the safe one comes last."""
     found = {name: how.draw(rng) for name, how in changes.items()}
-    if 'depth_of_cut' not in found or not changes['depth_of_cut'].of_limit:
-        return cut.with_changes(**found)
-    factor = found.pop('depth_of_cut')
-    cut = cut.with_changes(**found)
-    limit = safe_limit(setup.machine, cut, tool_leaves_cut=setup.tool_leaves_cut).depth_of_cut
-    return cut.with_changes(depth_of_cut=min(factor * float(limit), _DEEPEST))
+    if 'depth_of_cut' in found and changes['depth_of_cut'].of_limit:
+        factor, leaves = found.pop('depth_of_cut'), config.setup.tool_leaves_cut
+        cut = cut.with_changes(**found)
+        limit = safe_limit(config.machine, cut, tool_leaves_cut=leaves).depth_of_cut
+        found = {'depth_of_cut': min(factor * float(limit), _DEEPEST)}
+    return cut.with_changes(**found)

@@ -3,55 +3,50 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
-from operator import attrgetter
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.arrays import Array
-from lathe_chatter.dataset.drawing import DrawnMachine, DrawnRun, drawn_run
-from lathe_chatter.dataset.plan import CUT, Plan
+from lathe_chatter.dataset.drawing import DrawnRun, drawn_run
+from lathe_chatter.dataset.plan import Plan
 from lathe_chatter.lathe import EventKind
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.samples import sample_columns
 from lathe_chatter.stability.characteristic import Complex
 from lathe_chatter.stability.operating_points import operating_points
 
-TRUTH = {
-    'growth_rate': ('1/s', 'of the rightmost root of the cut at the end of the window'),
-    'frequency': ('Hz', 'of that root'),
-    'stable': ('', 'whether small disturbances of that cut die out'),
-    'regime': ('', 'free, seated or rattling: whether the workpiece touches its bearing'),
-    'share_out_of_cut': ('', 'of the window, in which the tool is out of the cut'),
-    'share_on_bearing': ('', 'of the window, in which the workpiece touches its bearing'),
-    'seconds_since_onset': ('s', 'since when, at the end, the cut has been unstable; nan: stable'),
-}
-"""The columns of the truth, with units and meanings."""
-PLACE = {
-    'machine': ('', 'number of the machine'),
-    'run': ('', 'number of the run of that machine'),
-    'seed': ('', 'of the noise of that run'),
-    'start': ('s', 'simulated time at which the window begins'),
-}
+PLACE = ('machine', 'run', 'seed', 'start')
+TRUTH = (
+    *('growth_rate', 'frequency', 'stable', 'regime', 'share_out_of_cut', 'share_on_bearing'),
+    'seconds_since_onset',
+)
+"""The columns of a window beside its signals and what was drawn; card.md.j2 says what they are."""
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""
+_REGIMES = np.array(['free', 'rattling', 'seated'])
+_CONTACTS = {
+    EventKind.BEARING_ENGAGES: (0, True),
+    EventKind.BEARING_RELEASES: (0, False),
+    EventKind.TOOL_LEAVES_CUT: (1, True),
+    EventKind.TOOL_ENTERS_CUT: (1, False),
+}
 
 
-def windows_of(plan: Plan, machines: Iterable[DrawnMachine]) -> tuple[Table, list[DrawnRun]]:
+def windows_of(plan: Plan, machines: Mapping[int, LatheConfig]) -> tuple[Table, list[DrawnRun]]:
     """The windows of some machines, and the runs that they are cut from."""
-    runs = [drawn_run(plan, each, number) for each in machines for number in range(plan.runs)]
-    pairs = [(run.setup, cut) for run in runs for cut in run.cuts.values()]
+    numbers = itertools.product(machines.items(), range(plan.runs))
+    runs = [drawn_run(plan, *machine, number) for machine, number in numbers]
+    pairs = [(run.config, cut) for run in runs for cut in run.cuts.values()]
     points = operating_points(
-        [setup.machine for setup, _ in pairs],
+        [config.machine for config, _ in pairs],
         [cut for _, cut in pairs],
-        tool_leaves_cut=[setup.tool_leaves_cut for setup, _ in pairs],
+        tool_leaves_cut=[config.setup.tool_leaves_cut for config, _ in pairs],
     )
-    bounds = itertools.pairwise(itertools.accumulate([0, *(len(run.cuts) for run in runs)]))
-    tables = [
-        _windows(plan, run, points.root[slice(*here)], points.stable[slice(*here)])
-        for run, here in zip(runs, bounds, strict=True)
-    ]
+    ends = np.cumsum([len(run.cuts) for run in runs])[:-1]
+    parts = zip(runs, np.split(points.root, ends), np.split(points.stable, ends), strict=True)
+    tables = [_windows(plan, *part) for part in parts]
     return {name: np.concatenate([t[name] for t in tables]) for name in tables[0]}, runs
 
 
@@ -59,34 +54,34 @@ def _windows(plan: Plan, run: DrawnRun, roots: Complex, stable: NDArray[np.bool_
     """The windows of a run, with the truth of each of its cuts."""
     samples, contacts = _simulated(plan, run)
     starts = np.array([s for s in plan.starts if s + plan.length <= len(samples)], np.int64)
-    names = sample_columns(accelerometers=run.setup.accelerometers)
+    names = sample_columns(accelerometers=run.config.setup.accelerometers)
     signals = {
         name: samples[starts[:, None] + np.arange(plan.length), names.index(name)].astype('f4')
         for name in plan.columns
     }
-    changes, ends = np.array([*run.cuts]), starts + plan.length
+    changes, ends, rate = np.array([*run.cuts]), starts + plan.length, plan.sample_rate
     now = np.searchsorted(changes, ends - 1, side='right') - 1
     # The change that made it unstable: the first after the last stable cut.
     calm = np.maximum.accumulate(np.where(stable, np.arange(len(stable)), -1))
     onset = np.where(stable, np.nan, changes[np.minimum(calm + 1, len(changes) - 1)])
-    rate = plan.sample_rate
-    on_bearing, out_of_cut = _shares(contacts, starts / rate, ends / rate)
-    regimes = np.array(['free', 'rattling', 'seated'])
+    # Time spent on the bearing and out of the cut, at the ends of each window, as a share of it.
+    times, lasted = contacts[:, 0], np.diff(contacts[:, 0])
+    spent = [np.concatenate(([0.0], np.cumsum(lasted * s))) for s in contacts[:-1, 1:].T]
+    edges = np.array([starts, ends]) / rate
+    on_bearing, out_of_cut = (
+        np.round(np.diff(np.interp(edges, times, total), axis=0)[0] * rate / plan.length, 9)
+        for total in spent
+    )
+    drawn = [LatheConfig(run.config.setup, cut).parameters() for cut in run.cuts.values()]
+    values = {name: np.array([each[name] for each in drawn])[now] for name in plan.drawn}
     facts = (
-        *(run.machine, run.number, run.setup.seed, starts / rate),
+        *(run.machine, run.number, run.config.setup.seed, starts / rate),
         *(roots.real[now], roots.imag[now] / (2.0 * np.pi), stable[now]),
-        *(regimes[(on_bearing > 0.0).astype(int) + (on_bearing >= 1.0)], out_of_cut, on_bearing),
+        *(_REGIMES[(on_bearing > 0.0).astype(int) + (on_bearing >= 1.0)], out_of_cut, on_bearing),
         (ends - onset[now]) / rate,
     )
-    told = {n: np.resize(v, len(starts)) for n, v in zip((*PLACE, *TRUTH), facts, strict=True)}
-    return {**told, **signals, **{name: _values(run, name)[now] for name in plan.drawn}}
-
-
-def _values(run: DrawnRun, name: str) -> Array:
-    """A parameter at each cut of a run (cuts,)."""
-    owner = run.setup if name in vars(run.setup) else run.setup.machine
-    found = [attrgetter(name)(cut if name in CUT else owner) for cut in run.cuts.values()]
-    return np.array([getattr(value, 'value', value) for value in found])
+    found = {n: np.resize(v, len(starts)) for n, v in zip((*PLACE, *TRUTH), facts, strict=True)}
+    return {**found, **signals, **values}
 
 
 def _simulated(plan: Plan, run: DrawnRun) -> tuple[Array, Array]:
@@ -96,35 +91,16 @@ def _simulated(plan: Plan, run: DrawnRun) -> tuple[Array, Array]:
         Samples (n, columns), and rows of time, s, whether the workpiece touches its bearing from
         then on, and whether the tool is out of the cut (m, 3).
     """
-    lathe, blocks, contacts = LatheConfig(run.setup, run.cuts[0]).lathe(), [], []
+    lathe, blocks, contacts = run.config.lathe(), [], []
     inside = {k for k in (*run.cuts, *run.knocks) if k < plan.samples}
     for here, stop in itertools.pairwise(sorted({0, *inside, plan.samples})):
         lathe.retune(run.cuts.get(here, lathe.cut))
         if here in run.knocks:
             lathe.knock(run.knocks[here])
-        now = {'touches': lathe.bearing_engaged, 'out': not lathe.tool_in_cut}
-        contacts.append((lathe.time, *now.values()))
+        now = [lathe.bearing_engaged, not lathe.tool_in_cut]
+        contacts.append((lathe.time, *now))
         blocks.append(lathe.advance(stop - here))
         for time, kind in lathe.events:
-            name, value = _AFTER[kind]
-            now[name] = value
-            contacts.append((time, *now.values()))
+            place, now[place] = _CONTACTS[kind]
+            contacts.append((time, *now))
     return np.concatenate(blocks), np.array([*contacts, (plan.duration + 1.0, False, False)])
-
-
-_AFTER = {
-    EventKind.BEARING_ENGAGES: ('touches', True),
-    EventKind.BEARING_RELEASES: ('touches', False),
-    EventKind.TOOL_LEAVES_CUT: ('out', True),
-    EventKind.TOOL_ENTERS_CUT: ('out', False),
-}
-
-
-def _shares(contacts: Array, begins: Array, ends: Array) -> Iterator[Array]:
-    """The shares of some intervals, s, spent on the bearing and out of the cut."""
-    times, lasted = contacts[:, 0], np.diff(contacts[:, 0])
-    for states in contacts[:-1, 1:].T:
-        total = np.concatenate(([0.0], np.cumsum(lasted * states)))
-        spent = np.interp(ends, times, total) - np.interp(begins, times, total)
-        whole = np.interp(ends, times, times) - np.interp(begins, times, times)
-        yield np.where(np.isclose(spent, whole, 1e-9, 0.0), 1.0, np.maximum(spent / whole, 0.0))

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lathe_chatter.code_identity import code_identity
 from lathe_chatter.errors import ResultFileError
 from lathe_chatter.executors import run_batches
 from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
@@ -76,7 +77,8 @@ class KnockGrid:
         names = ('speeds', 'depths', 'clearances')
         axes = {name: list(getattr(self, name)) for name in names}
         search = {name: getattr(self, name) for name in ('reach', 'step', 'tolerance')}
-        return {'kind': _KIND, 'parameters': self.config.parameters(), **axes, **search}
+        of = {'kind': _KIND, 'parameters': self.config.parameters(), **axes, **search}
+        return of | {'code': code_identity()}
 
 
 @dataclass(frozen=True)

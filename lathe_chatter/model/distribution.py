@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,6 +66,28 @@ def distributions(section: Section, rows: dict[str, Row]) -> dict[str, Distribut
     """
     section.only(*rows)
     return {n: distribution(section, n, row) for n, row in rows.items() if n in section.nodes}
+
+
+def single_values(section: Section, rows: Iterable[Row], *others: str) -> dict[str, Any]:
+    """The values of a section that are not drawn, defaults for the rest.
+
+    Args:
+        section: Where they stand.
+        rows: What they are.
+        others: What else the section may have.
+
+    Raises:
+        MachineFileError: With file, line, field, value and what is allowed.
+    """
+    named = {row.name: row for row in rows}
+    section.only(*named, *others)
+    found = {name: row.default for name, row in named.items()}
+    for name in named.keys() & section.nodes.keys():
+        how = distribution(section, name, named[name])
+        if how.kind != FIXED:
+            raise section.refused(f'{name} must be a single value', section.nodes[name])
+        found[name] = how.values[0]
+    return found
 
 
 def distribution(section: Section, name: str, row: Row, *, of_limit: bool = False) -> Distribution:

@@ -32,7 +32,7 @@ from lathe_chatter.model.machine import Body, Machine, Mode
 from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.model.uncertainty import MODAL, MOST_VARIANCE, Uncertainty
 from lathe_chatter.model.units import number_in
-from lathe_chatter.model.yaml_section import Section, text_of
+from lathe_chatter.model.yaml_section import Section, section_of, text_of
 
 _TURN = 2.0 * np.pi
 _PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
@@ -46,19 +46,13 @@ _MODE = {
 _UNCERTAIN = {k: _MODE[k] for k in ('frequency', 'damping_ratio', 'mass', 'stiffness')}
 _COEFFICIENT = {'cutting_coefficient': limits_of(Machine, 'cutting_coefficient')}
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
-_SPINDLE = {
-    'slowest_speed': _SPEED,
-    'fastest_speed': _SPEED,
-    'acceleration': limits_of(LatheSetup, 'spindle_acceleration'),
-}
-_CUT_OF_BEARING = {'clearance': 'bearing_clearance'}
-_CUT_OF_MATERIAL = {'process_damping': 'process_damping'}
-_CUT = {
-    'spindle_speed': 'spindle_speed_rpm',
-    'depth_of_cut': 'depth_of_cut',
-    'feed': 'feed_per_revolution',
-    'feed_speed': 'feed_speed',
-    'workpiece_diameter': 'workpiece_diameter',
+_SPINDLE = dict.fromkeys(('slowest_speed', 'fastest_speed'), _SPEED)
+_SPINDLE['acceleration'] = limits_of(LatheSetup, 'spindle_acceleration')
+_OF_CUT = {
+    'bearing': {'clearance': 'bearing_clearance'},
+    'material': {'process_damping': 'process_damping'},
+    'cut': {'spindle_speed': 'spindle_speed_rpm', 'feed': 'feed_per_revolution'}
+    | {name: name for name in ('depth_of_cut', 'feed_speed', 'workpiece_diameter')},
 }
 """Names in the file of what are fields of a `Cut`, by section."""
 _USUAL_SPEED = Cut().spindle_speed_rpm
@@ -120,26 +114,25 @@ class MachineDescription:
                 made[name]['covariance'] = covariance.tolist()
         made['bearing'] = {
             'stiffness': self.machine.bearing_stiffness,
-            **self._of_cut(_CUT_OF_BEARING),
+            **self._of_cut('bearing'),
             'contact': self.cut.bearing_contact.value,
         }
         made['material'] = {
             'cutting_coefficient': self.machine.cutting_coefficient,
-            **self._of_cut(_CUT_OF_MATERIAL),
+            **self._of_cut('material'),
         }
-        error = known.error_of('cutting_coefficient') if known else None
-        if error:
+        if known and (error := known.error_of('cutting_coefficient')):
             made['material']['errors'] = {'cutting_coefficient': f'{100.0 * error!r} %'}
         if self.speed_range is not None:
             slowest, fastest = self.speed_range
             made['spindle'] = {'slowest_speed': slowest, 'fastest_speed': fastest}
         if self.spindle_acceleration:
             made.setdefault('spindle', {})['acceleration'] = self.spindle_acceleration
-        made['cut'] = self._of_cut(_CUT)
+        made['cut'] = self._of_cut('cut')
         return made
 
-    def _of_cut(self, names: dict[str, str]) -> dict[str, float]:
-        return {name: getattr(self.cut, field) for name, field in names.items()}
+    def _of_cut(self, section: str) -> dict[str, float]:
+        return {name: getattr(self.cut, field) for name, field in _OF_CUT[section].items()}
 
 
 def _described(mode: Mode) -> dict[str, Any]:
@@ -186,17 +179,7 @@ def load_machine(source: Path | str) -> MachineDescription:
             raise MachineFileError(
                 f'The machine {source} cannot be read: {reason}. Shipped are: {shipped}.'
             ) from None
-    try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        line = f', line {mark.line + 1}' if mark else ''
-        raise MachineFileError(f'{name}{line}: {error.problem}.') from None
-    except yaml.YAMLError as error:
-        raise MachineFileError(f'{name}: {" ".join(str(error).split())}.') from None
-    except RecursionError:
-        raise MachineFileError(f'{name}: it is nested too deeply for a machine.') from None
-    return _description(Section(node, name, ''), Path(name).stem)
+    return _description(section_of(text, name), Path(name).stem)
 
 
 def _description(top: Section, name: str) -> MachineDescription:
@@ -204,25 +187,24 @@ def _description(top: Section, name: str) -> MachineDescription:
     machine: dict[str, Any] = {}
     known = Uncertainty()
     for part in ('tool', 'workpiece'):
-        section = top.section(part)
-        if section is not None:
+        if section := top.section(part):
             machine[part], known = _body(section, part, known)
     bearing, material = top.inner('bearing'), top.inner('material')
-    bearing.only('stiffness', *_CUT_OF_BEARING, 'contact')
-    stiffness = bearing.number('stiffness', limits_of(Machine, 'bearing_stiffness'))
-    if stiffness is not None:
+    bearing.only('stiffness', *_OF_CUT['bearing'], 'contact')
+    limits = limits_of(Machine, 'bearing_stiffness')
+    if (stiffness := bearing.number('stiffness', limits)) is not None:
         machine['bearing_stiffness'] = stiffness
-    cut = _fields(bearing, _CUT_OF_BEARING) | _contact(bearing)
+    cut = _fields(bearing) | _contact(bearing)
     if 'bearing' not in top.nodes and 'workpiece' in machine:
         cut['bearing_contact'] = BearingContact.NONE
-    material.only(*_COEFFICIENT, *_CUT_OF_MATERIAL, 'errors')
+    material.only(*_COEFFICIENT, *_OF_CUT['material'], 'errors')
     found = material.numbers(_COEFFICIENT)
     machine |= found
     for figure, error in material.errors(found, _COEFFICIENT).items():
         known = known.with_error(figure, error)
     section = top.inner('cut')
-    section.only(*_CUT)
-    cut |= _fields(material, _CUT_OF_MATERIAL) | _fields(section, _CUT)
+    section.only(*_OF_CUT['cut'])
+    cut |= _fields(material) | _fields(section)
     if 'feed_per_revolution' in cut:  # the feed speed at the start; a feed of 0 is none
         per_minute = cut['feed_per_revolution'] * cut.get('spindle_speed_rpm', _USUAL_SPEED)
         cut.setdefault('feed_speed', per_minute / 60.0)
@@ -235,10 +217,9 @@ def _description(top: Section, name: str) -> MachineDescription:
 
 
 def _contact(section: Section) -> dict[str, Any]:
-    node = section.nodes.get('contact')
+    node, words = section.nodes.get('contact'), [choice.value for choice in BearingContact]
     if node is None:
         return {}
-    words = [choice.value for choice in BearingContact]
     if text_of(node) not in words:
         allowed = f'it must be one of {", ".join(words)}'
         raise section.refused(f'contact is {text_of(node)!r}: {allowed}', node)
@@ -258,8 +239,9 @@ def _spindle(section: Section) -> dict[str, float]:
     return found
 
 
-def _fields(section: Section, names: dict[str, str]) -> dict[str, Any]:
+def _fields(section: Section) -> dict[str, Any]:
     """Those fields of a cut that a section has, by their names."""
+    names = _OF_CUT[section.path]
     found = section.numbers({name: limits_of(Cut, field) for name, field in names.items()})
     return {names[name]: value for name, value in found.items()}
 
@@ -271,9 +253,8 @@ def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], 
     for k, entry in enumerate(section.items('modes')):
         entry.only(*_MODE, 'errors')
         found = entry.numbers(_MODE)
-        for name in ('frequency', 'damping_ratio'):
-            if name not in found:
-                raise entry.refused(f'it needs {name}')
+        if missing := [name for name in ('frequency', 'damping_ratio') if name not in found]:
+            raise entry.refused(f'it needs {missing[0]}')
         if ('mass' in found) == ('stiffness' in found):
             raise entry.refused('it needs either mass or stiffness')
         errors = entry.errors(found, _UNCERTAIN)

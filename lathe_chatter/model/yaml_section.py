@@ -21,6 +21,27 @@ def text_of(node: yaml.Node) -> str:
     return str(node.value if isinstance(node, yaml.ScalarNode) else yaml.serialize(node)).strip()
 
 
+def section_of(text: str, file: str) -> Section:
+    """The mapping that a YAML file is.
+
+    Args:
+        text: Of the file.
+        file: What it is called where something is wrong with it.
+
+    Raises:
+        MachineFileError: If it is none.
+    """
+    try:
+        return Section(yaml.compose(text, Loader=yaml.SafeLoader), file, '')
+    except yaml.YAMLError as error:
+        mark, problem = (getattr(error, name, None) for name in ('problem_mark', 'problem'))
+        line = f', line {mark.line + 1}' if mark else ''
+        said = f'{file}{line}: {problem or " ".join(str(error).split())}.'
+    except RecursionError:
+        said = f'{file}: it is nested too deeply.'
+    raise MachineFileError(said)
+
+
 class Section:
     """A mapping of a YAML file whose entries know their lines."""
 

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lathe_chatter.knocks import KnockMap, Margin
 from lathe_chatter.knocks.knock_map import Point
-from lathe_chatter.plot_style import ALARM, OPEN, SAFE, SEATED, grid, new_figure, save, scale_for
+from lathe_chatter.plot_style import (
+    ALARM,
+    NEUTRAL,
+    OPEN,
+    SAFE,
+    SEATED,
+    grid,
+    new_figure,
+    save,
+    scale_for,
+)
 from lathe_chatter.report.stability_chart import (
     bearing_text,
     chart_limits,
@@ -22,6 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MILLI = 1e3
+_WIDTH, _HEIGHT = 9.0, 4.5
+"""Of a panel, about, inches."""
 
 
 def draw_knock_map(knocks: KnockMap, path: Path) -> None:
@@ -29,7 +41,7 @@ def draw_knock_map(knocks: KnockMap, path: Path) -> None:
     grid_of = knocks.grid
     if len(grid_of.speeds) > 1 and len(grid_of.depths) > 1:
         panels = len(grid_of.clearances)
-        figure = new_figure(11.0, 1.0 + 5.0 * panels)
+        figure = new_figure(_WIDTH + 2.0, 1.0 + (_HEIGHT + 0.5) * panels)
         for axes, clearance in zip(
             figure.subplots(panels, squeeze=False)[:, 0], grid_of.clearances, strict=True
         ):
@@ -41,46 +53,44 @@ def draw_knock_map(knocks: KnockMap, path: Path) -> None:
 
 
 def _draw_plane(axes: Axes, knocks: KnockMap, clearance: float) -> None:
-    """Impulse as colour over speed and depth, with the limits of the chart."""
-    from matplotlib.colors import ListedColormap, LogNorm
+    """Each point that was computed, impulse as colour, over speed and depth, with the limits."""
+    from matplotlib.colors import LogNorm
 
     of = knocks.grid
-    speeds, depths = np.array(of.speeds), np.array(of.depths) * _MILLI
-    impulse = np.full((depths.size, speeds.size), np.nan)
-    kind = np.full(impulse.shape, np.nan)
-    for row, depth in enumerate(of.depths):
-        for column, speed in enumerate(of.speeds):
-            limit = knocks.limits.get(Point(speed, depth, clearance))
-            if limit is None:
-                continue
-            if limit.margin is Margin.FINITE:
-                impulse[row, column] = abs(limit.impulse)
-            else:
-                kind[row, column] = float(limit.margin is Margin.UNSTABLE)
-    axes.pcolormesh(
-        speeds, depths, kind, cmap=ListedColormap(['#D8F0E7', '#DDDDDD']), vmin=0.0, vmax=1.0,
-        shading='nearest', rasterized=True,
-    )  # fmt: skip
-    if np.isfinite(impulse).any():
-        scale = scale_for('N s', impulse[np.isfinite(impulse)])
-        impulse *= scale.factor
-        low, high = float(np.nanmin(impulse)), float(np.nanmax(impulse))
-        colours = axes.pcolormesh(
-            speeds, depths, impulse, cmap='inferno', norm=LogNorm(low, max(high, 1.01 * low)),
-            shading='nearest', rasterized=True,
+    here = [point for point in of.points() if point.bearing_clearance == clearance]
+    points = {point: knocks.limits[point] for point in here if point in knocks.limits}
+    # Points in inches times 72, so that neighbours do not touch; none is cut by the frame.
+    gap = min(_WIDTH / len(of.speeds), _HEIGHT / len(of.depths))
+    style: dict[str, Any] = {'s': (50.0 * min(gap, 0.25)) ** 2, 'clip_on': False, 'zorder': 3}
+    for margin, colour, said in (
+        (Margin.NONE_FOUND, SAFE, 'no lasting knock found'),
+        (Margin.UNSTABLE, NEUTRAL, 'chatters unknocked'),
+    ):
+        of_kind = [point for point, limit in points.items() if limit.margin is margin]
+        x, y = ([point[k] for point in of_kind] for k in (0, 1))
+        axes.scatter(x, _MILLI * np.array(y), color=colour, alpha=0.35, lw=0, label=said, **style)
+    finite = {p: abs(v.impulse) for p, v in points.items() if v.margin is Margin.FINITE}
+    if finite:
+        impulse = np.array([*finite.values()])
+        scale = scale_for('N s', impulse)
+        low, high = impulse.min() * scale.factor, impulse.max() * scale.factor
+        x, y = ([point[k] for point in finite] for k in (0, 1))
+        colours = axes.scatter(
+            x, _MILLI * np.array(y), c=impulse * scale.factor, cmap='plasma', lw=0,
+            norm=LogNorm(low, max(high, 1.01 * low)), **style,
         )  # fmt: skip
         label = f'smallest lasting knock / ({scale.unit})'
-        axes.figure.colorbar(colours, ax=axes, label=label, pad=0.01)
+        bar = axes.figure.colorbar(colours, ax=axes, label=label, pad=0.02)
+        bar.ax.yaxis.set_major_formatter('{x:g}')
+        bar.ax.yaxis.set_minor_formatter('{x:g}')
     cut = of.config.cut.with_changes(bearing_clearance=clearance)
-    limits = chart_limits(of.config.machine, cut, chart_speeds(speeds[0], speeds[-1]))
+    limits = chart_limits(of.config.machine, cut, chart_speeds(of.speeds[0], of.speeds[-1]))
     draw_limits(axes, limits, cut.bearing_contact, of.depths[-1], shade=False)
-    axes.set_ylim(depths[0] - 0.5 * (depths[1] - depths[0]), depths[-1])
-    axes.fill_between([], [], color='#D8F0E7', label='no lasting knock found')
-    axes.fill_between([], [], color='#DDDDDD', label='chatters unknocked')
+    axes.set_ylim(of.depths[0] * _MILLI, of.depths[-1] * _MILLI)
     axes.legend(
         loc='upper center', bbox_to_anchor=(0.5, -0.13), ncols=5, fontsize=9, frameon=False
     )
-    axes.set_title(f'The knock that a cut survives: {bearing_text(cut)}', size=11)
+    axes.set_title(f'The knock that a cut survives: {bearing_text(cut)}', size=11, pad=14)
 
 
 def _draw_curves(axes: Axes, knocks: KnockMap) -> None:

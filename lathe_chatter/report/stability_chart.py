@@ -163,7 +163,7 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
     if cut.depth_of_cut <= depth_limit and slowest <= cut.spindle_speed_rpm <= fastest:
         axes.plot(
             cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
-            ms=7, label='the cut',
+            ms=7, label='the cut', clip_on=False, zorder=5,
         )  # fmt: skip
     place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.1)}
     axes.legend(**place, ncols=5, fontsize=9, frameon=False)

@@ -78,7 +78,7 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     column = partial(_column, machine, cut, law, depths)
     columns = spread_into(
         kept_in,
-        {'growth rates': repr((machine, cut, law.value)), 'depths': depths.tolist()}
+        {'kind': 'growth rates', 'cut': repr((machine, cut, law.value)), 'depths': depths.tolist()}
         | {'speeds': speeds.tolist(), 'rests': rests.tolist()},
         column,
         list(zip(speeds.tolist(), rests.T.tolist(), strict=True)),

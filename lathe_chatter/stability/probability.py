@@ -103,8 +103,9 @@ def stability_probability(  # noqa: PLR0913 -- what is cut, how sure that is, an
     drawn, deviations = uncertainty.draw(machine, count_of('machines', machines, least=1), seed)
     found = spread_into(
         kept_in,
-        {'limits of machines': repr((machine, cut, tool_leaves_cut)), 'machines': machines}
-        | {'seed': seed, 'speeds': speeds.tolist(), 'errors': uncertainty.covariance.tolist()},
+        {'kind': 'limits of machines', 'cut': repr((machine, cut, tool_leaves_cut))}
+        | {'machines': machines, 'seed': seed, 'speeds': speeds.tolist()}
+        | {'errors': uncertainty.covariance.tolist()},
         partial(_limits_of, cut, speeds, tool_leaves_cut=tool_leaves_cut),
         drawn,
         executor=executor,

@@ -150,7 +150,7 @@ def test_knock_map_draws_tells_and_continues(
     assert json.loads(capsys.readouterr().out) == first
     assert points.read_bytes() == written
     assert cli.main([*call[:-1], '--tolerance', '0.2']) == 2
-    assert 'holds another map' in capsys.readouterr().err
+    assert 'not of the same tolerance' in capsys.readouterr().err
 
 
 HEAVY = (

@@ -20,7 +20,7 @@ from lathe_chatter.cli import main as cli
 from lathe_chatter.cli.executor_options import open_executor
 from lathe_chatter.dataset import load_plan, make_dataset, making, read_windows
 from lathe_chatter.dataset.plan import Plan
-from lathe_chatter.errors import DatasetError
+from lathe_chatter.errors import DatasetError, ResultFileError
 from lathe_chatter.recording import read_run
 
 pytest.importorskip('pyarrow')
@@ -192,13 +192,14 @@ def test_a_folder_of_something_else_is_left_as_it_is(tmp_path: Path) -> None:
     (folder / 'thesis.txt').unlink()
     make_dataset(plan, folder)
     before = digests(folder)
-    with pytest.raises(DatasetError, match='the data of another plan'):
+    with pytest.raises(ResultFileError, match='holds other results, not of the same plan'):
         make_dataset(plan_of(tmp_path, 'seed: 2'), folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(making, 'code_identity', lambda: 'lathe_chatter 9.9.9')
-        with pytest.raises(DatasetError, match=r'was begun with .* and this is lathe_chatter 9'):
+        with pytest.raises(ResultFileError, match=r'begun with .* and this is lathe_chatter 9'):
             make_dataset(plan, folder)
     assert digests(folder) == before
+    make_dataset(plan_of(tmp_path, '# a comment, or a title, makes no other data'), folder)
 
 
 def test_a_disk_that_is_full_loses_nothing(

@@ -10,7 +10,6 @@ import pytest
 from lathe_chatter.dataset.drawing import drawn_machine, drawn_run
 from lathe_chatter.dataset.plan import Plan, load_plan
 from lathe_chatter.dataset.windows import windows_of
-from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.stability import contact_at, rightmost_root
 
 TEXT = """
@@ -39,20 +38,20 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Plan:
 
 def test_signals_and_truth_are_those_of_the_same_lathe(plan: Plan) -> None:
     """Each run again with a lathe by hand: samples, roots, onset, contact and loss of cut."""
-    machines = [drawn_machine(plan, number) for number in range(plan.machines)]
+    machines = {number: drawn_machine(plan, number) for number in range(plan.machines)}
     table, runs = windows_of(plan, machines)
     assert len(table['machine']) == plan.windows
     assert {*table['stable'].tolist()} == {True, False}
     for run in runs:
-        assert run == drawn_run(plan, machines[run.machine], run.number)
+        assert run == drawn_run(plan, run.machine, machines[run.machine], run.number)
         own = (table['machine'] == run.machine) & (table['run'] == run.number)
-        lathe = LatheConfig(run.setup, run.cuts[0]).lathe()
+        lathe = run.config.lathe()
         samples, cuts, touching = [], [], []
         onset, before = np.nan, np.nan
         for sample in range(plan.samples):
             if sample in run.cuts:
                 lathe.retune(run.cuts[sample])
-                here = contact_at(run.setup.machine, lathe.cut)
+                here = contact_at(run.config.machine, lathe.cut)
                 before = onset = np.nan if here.stable else sample if np.isnan(before) else before
             if sample in run.knocks:
                 lathe.knock(run.knocks[sample])
@@ -66,9 +65,9 @@ def test_signals_and_truth_are_those_of_the_same_lathe(plan: Plan) -> None:
             signal = every[window, 2].astype('f4')
             assert found['tool_displacement'].tobytes() == signal.tobytes()
             cut, onset = cuts[window.stop - 1]
-            contact = contact_at(run.setup.machine, cut)
+            contact = contact_at(run.config.machine, cut)
             root = rightmost_root(
-                run.setup.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
+                run.config.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=contact.seated
             )
             assert found['growth_rate'] == pytest.approx(root.real, rel=1e-9)
             assert found['frequency'] == pytest.approx(root.imag / 2.0 / np.pi, rel=1e-9)
@@ -94,6 +93,6 @@ def test_a_run_that_its_guard_ends_has_fewer_windows(tmp_path: Path) -> None:
         encoding='utf-8',
     )
     plan = load_plan(path)
-    table, _ = windows_of(plan, [drawn_machine(plan, 0)])
+    table, _ = windows_of(plan, {0: drawn_machine(plan, 0)})
     assert 0 < len(table['start']) < plan.windows
     assert not table['stable'].any()

@@ -55,7 +55,7 @@ def test_another_map_is_not_written_into(tmp_path: Path) -> None:
     other = KnockGrid(config_from({'feed_speed': 0.005}), (3000.0,), (0.1e-3,), (5e-6,))
     run_knock_map(other, path)
     before = path.read_bytes()
-    with pytest.raises(ResultFileError, match='another map'):
+    with pytest.raises(ResultFileError, match='not of the same parameters'):
         run_knock_map(GRID, path)
     assert path.read_bytes() == before
     assert read_knock_map(path).grid == other
