@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing, nullcontext
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +79,8 @@ class ResultFile:
 
     def close(self) -> None:
         """Let go of the file."""
-        self._file.close()
+        with suppress(OSError):  # it tries again to write what `add` could not
+            self._file.close()
 
     def _not_written(self, error: OSError) -> ResultFileError:
         return ResultFileError(f'{self._path} cannot be written: {reason_of(error)}.')

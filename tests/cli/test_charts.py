@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import math
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lathe_chatter.cli import lobes
 from lathe_chatter.cli import main as cli
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.stability import rightmost_root, safe_limit
@@ -214,3 +216,42 @@ def test_bench_prints_figures(capsys: pytest.CaptureFixture[str]) -> None:
     values = [figure['value'] for figure in told['figures']['lathe']]
     assert values
     assert all(value > 0.0 and math.isfinite(value) for value in values)
+
+
+@pytest.mark.parametrize(
+    ('module', 'name', 'words'),
+    [
+        ('growth_map', '_column', ['--map']),
+        ('probability', '_limits_of', ['--uncertain', 'C=10%']),
+    ],
+)
+def test_an_interrupted_chart_goes_on_where_it_was(
+    module: str, name: str, words: list[str], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr(lobes, '_PROBABLE_MACHINES', 100)
+    place = import_module(f'lathe_chatter.stability.{module}')
+    computed, begun = getattr(place, name), list[object]()
+
+    def stopping(*values: object, **options: object) -> object:
+        begun.append(values)
+        if len(begun) == 80:
+            raise KeyboardInterrupt
+        return computed(*values, **options)
+
+    call = ['lobes', *words, '--from', '2000', '--to', '4000', '--json', '--output']
+    assert cli.main([*call, str(tmp_path / 'whole.png')]) == 0
+    whole = capsys.readouterr().out
+    monkeypatch.setattr(place, name, stopping)
+    assert cli.main([*call, str(tmp_path / 'a.png')]) == 130
+    assert f'the same call goes on from {tmp_path}/a.jsonl.' in capsys.readouterr().err
+    kept = (tmp_path / 'a.jsonl').read_text().count('\n') - 1
+    assert 0 < kept < 80
+    begun.clear()
+    begun.extend([()] * 80)
+    assert cli.main([*call, str(tmp_path / 'a.png')]) == 0
+    assert capsys.readouterr().out == whole
+    columns = len(json.loads(whole).get('map', {}).get('spindle_speed_rpm', ()))
+    # Of the probability one more call is of the cut itself, a thousand machines at its speed.
+    assert len(begun) - 80 == (columns or 1100) - kept
+    assert not (tmp_path / 'a.jsonl').exists()
