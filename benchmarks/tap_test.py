@@ -27,8 +27,10 @@ FIRST_SEED = 1000
 NORMAL_90 = 1.6449
 
 
-def one(task: tuple[int, float, str]) -> tuple[int, list[list[float]], list[list[float]], float]:
-    """Number of modes, relative errors, errors in standard errors, and processor time, s."""
+def one(
+    task: tuple[int, float, str],
+) -> tuple[int, list[list[float]], list[list[float]], float, bool]:
+    """Number of modes, relative errors, errors in standard errors, processor time, s, warned."""
     seed, floor, form = task
     begin = time.process_time()
     fit = fit_modes([tap_test(floor=floor, form=form, seed=seed)])
@@ -39,7 +41,7 @@ def one(task: tuple[int, float, str]) -> tuple[int, list[list[float]], list[list
             found = np.array([mode.frequency, mode.damping_ratio, mode.stiffness])
             relative.append((np.abs(found - truth) / truth).tolist())
             scaled.append((np.abs(found - truth) / mode.errors).tolist())
-    return len(fit.modes), relative, scaled, spent
+    return len(fit.modes), relative, scaled, spent, bool(fit.warnings)
 
 
 def main() -> None:
@@ -49,21 +51,22 @@ def main() -> None:
     seeds = parser.parse_args().seeds
     print(
         'form         noise   f / %    zeta / %  k / %    90 % interval holds       modes  CPU / s'
+        '  warned of'
     )
     with ProcessPoolExecutor() as pool:
         for form in ('receptance', 'accelerance'):
             for floor in (0.002, 0.01):
                 tasks = [(FIRST_SEED + k, floor, form) for k in range(seeds)]
                 found = list(pool.map(one, tasks))
-                relative = np.array([r for _, rows, _, _ in found for r in rows])
-                scaled = np.array([s for _, _, rows, _ in found for s in rows])
+                relative = np.array([r for _, rows, *_ in found for r in rows])
+                scaled = np.array([s for _, _, rows, *_ in found for s in rows])
                 f, zeta, k = 100.0 * np.median(relative, axis=0)
                 holds = ' '.join(f'{h:.1%}' for h in (scaled < NORMAL_90).mean(axis=0))
                 right = np.mean([count == len(THREE_MODES) for count, *_ in found])
-                cpu = np.median([spent for *_, spent in found])
+                cpu = np.median([spent for *_, spent, _ in found])
                 print(
                     f'{form:12} {floor:5.1%}  {f:.5f}  {zeta:.4f}    {k:.4f}   f, zeta, k {holds}'
-                    f'  {right:.1%}  {cpu:.2f}',
+                    f'  {right:.1%}  {cpu:.2f}     {sum(told for *_, told in found)}',
                     flush=True,
                 )
 

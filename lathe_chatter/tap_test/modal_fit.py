@@ -14,10 +14,7 @@ the residual.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -27,12 +24,12 @@ from scipy.optimize import least_squares, nnls
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ModalFitError
+from lathe_chatter.tap_test.candidate_poles import candidate_poles
 from lathe_chatter.tap_test.frequency_response import Complex, FrequencyResponse
 
 MOST_MODES = 8
-_POLE_ORDER = 40
-_AGREEING = 5
-"""Orders that must agree on a pole before it is a candidate."""
+_EXPLAINED = 0.05
+"""Of what the modes leave, the part that no pole of mere noise explains."""
 _MOST_CALLS = 200
 _ROUNDS = 3
 """Of fitting and weighing in turn; the weights settle in two or three."""
@@ -104,9 +101,9 @@ def fit_modes(
         raise ModalFitError(f'modes is {modes}: it must be from 1 to {MOST_MODES}.')
     band = tuple(r.within(lowest_frequency, highest_frequency) for r in responses)
     fit = _Fit(band)
-    candidates = _candidates(band)
+    candidates = candidate_poles(band)
     poles: list[tuple[float, float]] = []
-    best: tuple[float, Array, list[tuple[float, float]]] | None = None
+    best: tuple[float, Array] | None = None
     while len(poles) < (modes or MOST_MODES):
         found = _next_pole(fit, poles, candidates)
         if found is None:
@@ -116,13 +113,13 @@ def fit_modes(
         score = fit.information(parameters)
         if modes is None and best is not None and score > best[0] - 10.0:
             break
-        best = (score, parameters, poles)
+        best = (score, parameters)
     if best is None or (modes is not None and len(poles) < modes):
         raise ModalFitError(
             f'{band[0].source}: {modes or "no"} modes could not be found between '
             f'{band[0].frequency[0]:g} and {band[0].frequency[-1]:g} Hz.'
         )
-    return fit.result(best[1])
+    return fit.result(best[1], candidates)
 
 
 class _Fit:
@@ -274,7 +271,7 @@ class _Fit:
         likelihood = float(left @ left) + 2.0 * float(np.log(deviations).sum())
         return likelihood + parameters.size * math.log(left.size)
 
-    def result(self, parameters: Array) -> ModalFit:
+    def result(self, parameters: Array, candidates: list[tuple[float, float]]) -> ModalFit:
         """The modes in ascending order, with their covariance and what is to be warned of."""
         parameters = self.refine(self.poles_of(parameters))
         jacobian = self._jacobian(parameters)
@@ -286,12 +283,11 @@ class _Fit:
         covariance = whole[np.ix_(index, index)]
         modes = []
         for place, k in enumerate(order):
-            frequency = math.exp(parameters[3 * k]) / (2.0 * math.pi)
-            values = (frequency, *np.exp(parameters[3 * k + 1 : 3 * k + 3]))
             spread = np.sqrt(np.diag(covariance)[3 * place : 3 * place + 3])
-            f, z, stiffness = (float(v * s) for v, s in zip(values, spread, strict=True))
-            errors = (f, z, stiffness)
-            modes.append(FittedMode(values[0], float(values[1]), float(values[2]), errors))
+            values = np.exp(parameters[3 * k : 3 * k + 3]) / (2.0 * math.pi, 1.0, 1.0)
+            frequency, zeta, stiffness = values.tolist()
+            f, z, s = (values * spread).tolist()
+            modes.append(FittedMode(frequency, zeta, stiffness, (f, z, s)))
         found = tuple(modes)
         return ModalFit(
             found,
@@ -299,7 +295,7 @@ class _Fit:
             self.responses,
             tuple(self.model(parameters)),
             tuple(self.deviations),
-            tuple(_warnings(found, self.responses)),
+            tuple(_warnings(found, self.responses) + _against(self, parameters, candidates)),
         )
 
 
@@ -309,58 +305,32 @@ def _smooth(values: Array, width: int = 5) -> Array:
     return np.convolve(padded, np.full(width, 1.0 / width), 'valid')
 
 
-def _candidates(responses: Sequence[FrequencyResponse]) -> list[tuple[float, float]]:
-    """Poles (omega, zeta) of the first response by the complex frequency method, every order."""
-    with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
-        warnings.simplefilter('ignore')
-        try:
-            from sdypy import EMA
-        except ImportError:
-            raise ModalFitError(
-                "A tap test needs the package sdypy-EMA: pip install 'lathe_chatter[identify]'."
-            ) from None
-        response = responses[0]
-        frequency = response.frequency
-        order = min(_POLE_ORDER, frequency.size // 8)
-        model = EMA.Model(
-            frf=(response.response / response.of_receptance)[None, :],
-            freq=frequency,
-            lower=float(frequency[0]),
-            upper=float(frequency[-1]),
-            pol_order_high=int(order),
-            frf_form='receptance',
-        )
-        model.get_poles(method='lscf', show_progress=False)
-    poles = np.concatenate([np.atleast_1d(np.asarray(p, complex)) for p in model.all_poles])
-    size = np.abs(poles)
-    damping = -poles.real / np.maximum(size, 1e-300)
-    inside = (poles.imag > 0.0) & (damping > 1e-5) & (damping < 0.5)
-    inside &= (size > 2.0 * np.pi * frequency[0]) & (size < 2.0 * np.pi * frequency[-1])
-    return _clusters(size[inside], damping[inside])
-
-
-def _clusters(size: Array, damping: Array) -> list[tuple[float, float]]:
-    """The poles that several orders agree on: a mode stays where it is, noise moves."""
-    by_size = np.argsort(size)
-    size, damping = size[by_size], damping[by_size]
-    edges = np.flatnonzero(np.diff(size) > 0.003 * size[1:]) + 1
-    return [
-        (float(np.median(p)), float(np.median(z)))
-        for p, z in zip(np.split(size, edges), np.split(damping, edges), strict=True)
-        if p.size >= _AGREEING
-    ]
-
-
 def _next_pole(
-    fit: _Fit, poles: list[tuple[float, float]], candidates: list[tuple[float, float]]
+    fit: _Fit,
+    poles: list[tuple[float, float]],
+    candidates: list[tuple[float, float]],
+    sign: float = 1.0,
 ) -> tuple[float, float] | None:
-    """The candidate that explains most of what the poles so far leave, with a positive mass."""
+    """The candidate that explains most of what the poles so far leave, with a mass of a sign."""
     best, least = None, math.inf
     for candidate in candidates:
         amplitudes, left = fit.amplitudes([*poles, candidate])
-        if amplitudes[len(poles)] > 0.0 and left < least:
+        if sign * amplitudes[len(poles)] > 0.0 and left < least:
             best, least = candidate, left
     return best
+
+
+def _against(fit: _Fit, parameters: Array, candidates: list[tuple[float, float]]) -> list[str]:
+    """Whether something moves against the force, as nothing does at the point where it acts."""
+    poles = fit.poles_of(parameters)
+    found = _next_pole(fit, poles, candidates, sign=-1.0)
+    if found is None:
+        return []
+    none, without, with_it = (fit.amplitudes(p)[1] for p in ([], poles, [*poles, found]))
+    if without - with_it < max(_EXPLAINED * without, 1e-6 * none):
+        return []
+    where = f'What vibrates at {found[0] / 2.0 / math.pi:.1f} Hz moves against the force'
+    return [f'{where}: it was not measured where that acts, or has its sign reversed.']
 
 
 def _warnings(modes: Sequence[FittedMode], responses: Sequence[FrequencyResponse]) -> list[str]:

@@ -58,6 +58,13 @@ def test_a_mode_at_the_edge_and_a_low_coherence_are_warned_of() -> None:
     assert any('coherence' in said for said in noisy.warnings)
 
 
+def test_what_was_not_measured_where_the_force_acts_is_warned_of() -> None:
+    """There a mode moves against the force, as none does where it acts."""
+    modes = [(f, zeta, -k if f == 310.0 else k) for f, zeta, k in THREE_MODES]
+    fit = fit_modes([tap_test(modes, floor=0.002, form='accelerance')])
+    assert any('310' in said and 'against the force' in said for said in fit.warnings)
+
+
 def test_modes_closer_than_they_are_wide_are_warned_of() -> None:
     close = ((300.0, 0.03, 1e7), (309.0, 0.03, 1.2e7))
     fit = fit_modes([tap_test(close, floor=1e-4)], modes=2)
