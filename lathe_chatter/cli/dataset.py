@@ -46,12 +46,12 @@ def run(options: Namespace) -> int:
     with screen.working('Making the windows of a machine, to estimate ...'):
         cost = _estimate(plan)
     if options.dry_run:
-        _tell(plan, cost, options.workers, screen)
+        _say_cost(plan, cost, options.workers, screen)
         screen.json({'windows': plan.windows, 'bytes': cost.size, 'core_seconds': cost.seconds})
         return 0
     try:
         with executor_of(options, screen) as executor:
-            _tell(plan, cost, width_of(executor), screen)
+            _say_cost(plan, cost, width_of(executor), screen)
             _check_room(folder, cost)
             with screen.progress('windows', plan.windows) as bar:
                 entries = make_dataset(plan, folder, executor=executor, progress=bar.show)
@@ -82,7 +82,7 @@ def _estimate(plan: Plan) -> _Cost:
     return _Cost(sum(map(len, files.values())) * plan.machines, spent * plan.machines)
 
 
-def _tell(plan: Plan, cost: _Cost, workers: int | None, screen: Screen) -> None:
+def _say_cost(plan: Plan, cost: _Cost, workers: int | None, screen: Screen) -> None:
     """What it will be and take."""
     seconds = cost.seconds / (workers or 1)
     long = f'{seconds / 60.0:.0f} min' if seconds > 99.0 else f'{seconds:.0f} s'

@@ -95,7 +95,7 @@ def _work(
         for paper_run in PAPER_RUNS:
             results.append(reproduce_run(paper_run))
             step()
-        findings = find(tell=step)
+        findings = find(progress=step)
         if pictures:
             draw(draw_growth, results, folder / 'growth')
             draw(draw_conditions, results, folder / 'conditions')

@@ -40,8 +40,7 @@ def drawn_machine(plan: Plan, number: int) -> LatheConfig:
     values = {name: how.draw(rng) for name, how in plan.machine.items()}
     if MACHINE_FILE.name in values:
         values[MACHINE_FILE.name] = plan.files[values[MACHINE_FILE.name]]
-    steps = {'sample_rate': plan.sample_rate, 'spindle_acceleration': 0.0}
-    config = config_from({**values, **steps})
+    config = config_from({**values, 'sample_rate': plan.sample_rate, 'spindle_acceleration': 0.0})
     if not plan.errors:
         return config
     file = config.described.uncertainty if config.described and plan.errors == OF_FILE else None

@@ -75,9 +75,9 @@ def _write_runs(folder: Path, table: Table, runs: list[DrawnRun], duration: floa
         knocks = [Knock(sample / rate, impulse) for sample, impulse in run.knocks.items()]
         simulate(scenario, folder / name, knocks=knocks, monitor=False)
     facts = {name: values.tolist() for name, values in table.items() if values.ndim == 1}
-    rows = [dict(zip(facts, row, strict=True)) for row in zip(*facts.values(), strict=True)]
-    text = ''.join(json.dumps(row) + '\n' for row in rows)
-    (folder / 'truth.jsonl').write_text(text, encoding='utf-8')
+    rows = (dict(zip(facts, row, strict=True)) for row in zip(*facts.values(), strict=True))
+    lines = [json.dumps(row) + '\n' for row in rows]
+    (folder / 'truth.jsonl').write_text(''.join(lines), encoding='utf-8')
 
 
 def read_part(path: Path) -> Table:

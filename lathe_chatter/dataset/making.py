@@ -36,8 +36,8 @@ _PART_SIZE = 8e6
 
 def parts_of(plan: Plan) -> dict[str, range]:
     """The machines of each part by its path, of one split each: always the same."""
-    windows = len(plan.starts) * plan.length * len(plan.columns) * 4
-    size = 80 * plan.samples if plan.form is Form.MCAP else windows
+    size = 4 * len(plan.columns) * len(plan.starts) * plan.length
+    size = 80 * plan.samples if plan.form is Form.MCAP else size
     step = max(1, round(_PART_SIZE / (plan.runs * size)))
     return {
         f'{split}/part-{number:05}{ENDINGS[plan.form]}': machines[first : first + step]
@@ -54,8 +54,8 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
     count, digest = len(table['machine']), hashlib.sha256()
     for values in table.values():
         digest.update(np.ascontiguousarray(values).data)
-    usual = MachineDescription()
-    told = {k: replace(c.described or usual, machine=c.machine) for k, c in machines.items()}
+    described = {k: c.described or MachineDescription() for k, c in machines.items()}
+    texts = {k: replace(d, machine=machines[k].machine).text() for k, d in described.items()}
     return files, {
         'part': part[0],
         'windows': count,
@@ -63,7 +63,7 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
         'ended_early': len(runs) * len(plan.starts) - count,
         'windows_sha256': digest.hexdigest(),
         'files': {n: [len(b), hashlib.sha256(b).hexdigest()] for n, b in files.items()},
-        'machines': {number: json.loads(each.text()) for number, each in told.items()},
+        'machines': {number: json.loads(text) for number, text in texts.items()},
     }
 
 
@@ -105,8 +105,8 @@ def make_dataset(
         card = Template(template, undefined=StrictUndefined)
         text = card.render(plan=plan, header=header, parts=entries, units=UNITS, table=LATHE)
         (folder / CARD).write_text(text, encoding='utf-8')
-        in_order = '\n'.join([*map(json.dumps, (header, *entries)), ''])
-        _write(manifest, {'.': in_order.encode()})
+        in_order = [json.dumps(line) + '\n' for line in (header, *entries)]
+        _write(manifest, {'.': ''.join(in_order).encode()})
     except OSError as error:
         raise DatasetError(
             f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there is '

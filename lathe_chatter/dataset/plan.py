@@ -16,13 +16,7 @@ import yaml
 from lathe_chatter.errors import MachineFileError, ParameterError, PlanError, reason_of
 from lathe_chatter.lathe.config import config_from
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
-from lathe_chatter.model.distribution import (
-    FIXED,
-    Distribution,
-    distribution,
-    distributions,
-    single_values,
-)
+from lathe_chatter.model.distribution import Distribution, distribution, distributions, values_of
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
 from lathe_chatter.model.parameter_table import Row
 from lathe_chatter.model.parameters import CUT_ROWS, LATHE, MACHINE_FILE, MACHINE_ROWS
@@ -40,6 +34,7 @@ _COUNT, _TIME = Quantity('', low=1.0, high=1e9), Quantity('', 's', high=3600.0)
 _SHARE = Quantity('a share', high=1.0)
 _TOP = [Row('title', '', ''), LATHE['seed'], Row('duration', 2.0, '', _TIME)]
 _TOP += [Row('machines', 100, '', _COUNT), Row('runs', 1, '', _COUNT)]
+_INNER = ('machine', 'cut', 'sensors', 'events', 'windows', 'splits')
 _WINDOWS = [Row(name, 0.0, '', _TIME) for name in ('length', 'every', 'first')]
 _EVENT = [Row('share', 1.0, '', _SHARE), Row('over', 0.0, '', _TIME)]
 
@@ -92,7 +87,7 @@ class Plan:
     def drawn(self) -> list[str]:
         """The parameters that differ from window to window, in the order of the table."""
         names = {name for event in self.events for name in event.changes}
-        names |= {n for n, how in (self.machine | self.cut).items() if how.kind != FIXED}
+        names |= {n for n, how in (self.machine | self.cut).items() if len(how.values) > 1}
         names |= {'spindle_speed_rpm', 'depth_of_cut'}
         return [row.name for row in LATHE if row.name in names - {MACHINE_FILE.name}]
 
@@ -121,13 +116,12 @@ def load_plan(path: Path) -> Plan:
 
 
 def _plan(top: Section, path: Path, text: str) -> Plan:
-    inner = ('machine', 'cut', 'sensors', 'events', 'windows', 'splits')
-    values = single_values(top, [*_TOP, Row('form', 'parquet', '', choices=Form)], *inner)
+    values = values_of(top, [*_TOP, Row('form', 'parquet', '', choices=Form)], *_INNER)
     machine, files, errors = _machine(top.inner('machine'), path)
     sensors, windows = top.inner('sensors'), top.inner('windows')
-    rate = single_values(sensors, [LATHE['sample_rate']], 'columns')['sample_rate']
+    rate = values_of(sensors, [LATHE['sample_rate']], 'columns')['sample_rate']
     samples = round(values['duration'] * rate)
-    length, every, first = (round(v * rate) for v in single_values(windows, _WINDOWS).values())
+    length, every, first = (round(v * rate) for v in values_of(windows, _WINDOWS).values())
     length = length or samples - first
     if not 1 <= length <= samples - first:
         raise windows.refused(f'a window must lie within the run of {values["duration"]:g} s')
@@ -150,7 +144,7 @@ def _plan(top: Section, path: Path, text: str) -> Plan:
 
 def _machine(section: Section, path: Path) -> tuple[dict[str, Distribution], dict[str, str], str]:
     """How machines are drawn, the files that are named, and the errors."""
-    errors = single_values(section, [Row('errors', '', '')], *_MACHINE)['errors']
+    errors = values_of(section, [Row('errors', '', '')], *_MACHINE)['errors']
     section.nodes.pop('errors', None)
     drawn, described = distributions(section, _MACHINE), {'': MachineDescription()}
     if file := drawn.get(MACHINE_FILE.name):
@@ -172,13 +166,13 @@ def _columns(section: Section) -> tuple[str, ...]:
     if node is None:
         return ('tool_displacement', 'workpiece_displacement')
     names = tuple(map(text_of, node.value)) if isinstance(node, yaml.SequenceNode) else ()
-    if not names or len({*names} & {*known}) < len(names):
-        raise section.refused(f'columns must be a list of some of {", ".join(known)}', node)
-    return names
+    if 0 < len(names) == len({*names} & {*known}):
+        return names
+    raise section.refused(f'columns must be a list of some of {", ".join(known)}', node)
 
 
 def _event(entry: Section) -> Event:
-    single = single_values(entry, _EVENT, 'at', 'set', 'knock')
+    single = values_of(entry, _EVENT, 'at', 'set', 'knock')
     rows = {'at': Row('at', 0.0, '', _TIME), 'knock': Row('knock', 0.0, '', IMPULSE)}
     at, knock = (distribution(entry, n, rows[n]) if n in entry.nodes else None for n in rows)
     changes = distributions(entry.inner('set'), CUT)

@@ -38,11 +38,11 @@ def windows_of(plan: Plan, machines: Mapping[int, LatheConfig]) -> tuple[Table, 
     """The windows of some machines, and the runs that they are cut from."""
     numbers = itertools.product(machines.items(), range(plan.runs))
     runs = [drawn_run(plan, *machine, number) for machine, number in numbers]
-    pairs = [(run.config, cut) for run in runs for cut in run.cuts.values()]
+    setups = [run.config.setup for run in runs for _ in run.cuts]
     points = operating_points(
-        [config.machine for config, _ in pairs],
-        [cut for _, cut in pairs],
-        tool_leaves_cut=[config.setup.tool_leaves_cut for config, _ in pairs],
+        [setup.machine for setup in setups],
+        [cut for run in runs for cut in run.cuts.values()],
+        tool_leaves_cut=[setup.tool_leaves_cut for setup in setups],
     )
     ends = np.cumsum([len(run.cuts) for run in runs])[:-1]
     parts = zip(runs, np.split(points.root, ends), np.split(points.stable, ends), strict=True)

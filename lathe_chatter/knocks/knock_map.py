@@ -142,7 +142,7 @@ def _grid(header: dict[str, Any]) -> KnockGrid:
 def run_knock_map(
     grid: KnockGrid,
     path: Path,
-    tell: Callable[[int, int], None] = lambda _done, _total: None,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
     *,
     executor: Executor | None = None,
 ) -> KnockMap:
@@ -151,7 +151,7 @@ def run_knock_map(
     Args:
         grid: What is wanted.
         path: Of the file; one that exists must be of the same grid, and is continued.
-        tell: Is told how many points of how many are there.
+        progress: Is told how many points of how many are there.
         executor: Where it is computed, see `executors`; by default threads, one a core.
 
     Raises:
@@ -163,13 +163,13 @@ def run_knock_map(
     with closing(file):
         done = _limits(file.entries)
         wanted = [point for point in points if point not in done]
-        tell(len(done), len(points))
+        progress(len(done), len(points))
         # One by one: a point may take seconds, and an interruption loses those in progress.
         for found in run_batches(grid.limit_at, [[point] for point in wanted], executor=executor):
             point, (limit,) = wanted[found.place], found.results
             done[point] = limit
             file.add(point._asdict() | _values(limit))
-            tell(len(done), len(points))
+            progress(len(done), len(points))
     return KnockMap(grid, done)
 
 

@@ -68,7 +68,7 @@ def distributions(section: Section, rows: dict[str, Row]) -> dict[str, Distribut
     return {n: distribution(section, n, row) for n, row in rows.items() if n in section.nodes}
 
 
-def single_values(section: Section, rows: Iterable[Row], *others: str) -> dict[str, Any]:
+def values_of(section: Section, rows: Iterable[Row], *others: str) -> dict[str, Any]:
     """The values of a section that are not drawn, defaults for the rest.
 
     Args:

@@ -111,23 +111,25 @@ class Findings:
     windows: tuple[Window, ...]
 
 
-def find(machine: Machine | None = None, tell: Callable[[str], None] = lambda _: None) -> Findings:
+def find(
+    machine: Machine | None = None, progress: Callable[[str], None] = lambda _: None
+) -> Findings:
     """Derive every finding.
 
     Args:
         machine: The paper's, but for what is varied.
-        tell: Is told what is looked into.
+        progress: Is told what is looked into.
     """
     paper = machine or Machine()
-    tell('the cutting force coefficient')
+    progress('the cutting force coefficient')
     readings = tuple(
         CoefficientReading(value, sum(verdicts_at(paper, value)))
         for value in (float(f'{MANTISSA}e{n}') for n in _EXPONENTS)
     )
     coefficient = coefficient_range(paper)
-    tell('the screening function')
+    progress('the screening function')
     screening = screening_readings(paper, WINDOWS)
-    tell('clearance, stiffness and duration')
+    progress('clearance, stiffness and duration')
     return Findings(
         readings,
         coefficient,
