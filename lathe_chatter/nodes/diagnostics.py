@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -79,6 +81,43 @@ class Diagnostics:
             hardware_id=self._hardware,
             values=[KeyValue(key=key, value=_text(v)) for key, v in status.values.items()],
         )
+
+
+class DiagnosticsListener:
+    """What the nodes say in /diagnostics, and when they spoke last.
+
+    Attributes:
+        statuses: Newest status of each part of each node: level, message and values, as texts.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.statuses: dict[str, dict[str, dict[str, Any]]] = {}
+        self._spoke_at: dict[str, float] = {}
+
+    def take(self, message: DiagnosticArray) -> None:
+        """Keep the newest status of each part."""
+        for status in message.status:
+            node, _, part = status.name.partition(': ')
+            self.spoke(node)
+            self.statuses[node] = {**self.statuses.get(node, {}), part: {
+                'level': int.from_bytes(status.level, 'little'),
+                'message': status.message,
+                'values': {each.key: each.value for each in status.values},
+            }}  # fmt: skip
+
+    def spoke(self, name: str) -> None:
+        """Something came from there."""
+        self._spoke_at[name] = time.monotonic()
+
+    def silence(self, name: str) -> float:
+        """How long nothing came from there, s."""
+        return time.monotonic() - self._spoke_at.get(name, -math.inf)
+
+    def values(self, node: str, part: str) -> dict[str, str]:
+        """The newest values of a part; empty where there are none."""
+        found: dict[str, str] = self.statuses.get(node, {}).get(part, {}).get('values', {})
+        return found
 
 
 def _text(value: object) -> str:

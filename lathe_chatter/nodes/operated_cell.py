@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -19,6 +18,7 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model.parameters import CUT_ROWS, LATHE
 from lathe_chatter.nodes.cell_clients import CellClients
+from lathe_chatter.nodes.diagnostics import DiagnosticsListener
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.sample_stream import join_blocks
 from lathe_chatter.page.board import Board
@@ -26,8 +26,10 @@ from lathe_chatter.page.chart import chart_key, stability_chart
 from lathe_chatter.page.live_signals import LiveSignals
 from lathe_chatter.page.server import Viewer
 from lathe_chatter.samples.codec import SampleDecoder
-from lathe_chatter.scenario import Scenario, find_scenario, load_scenario
+from lathe_chatter.scenario import Scenario, Step, find_scenario, load_scenario
 from lathe_chatter.scenario.player import ScenarioPlayer
+from lathe_chatter.scenario.scenario import ASKED
+from lathe_chatter.supervisor import ASKS
 
 FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -39,30 +41,6 @@ _STALE = 1.0
 """Simulated s after which a figure that does not come again is not known any more."""
 _CLOSEUP_PERIOD, _LOOK_PERIOD = 0.25, 0.5
 _SHOWN_SENTENCES = 80
-
-
-class Heard:
-    """What the nodes say in /diagnostics, and when they spoke last."""
-
-    def __init__(self) -> None:
-        """Begin with nothing."""
-        self.statuses: dict[str, dict[str, dict[str, Any]]] = {}
-        self.at: dict[str, float] = {}
-
-    def take(self, message: DiagnosticArray) -> None:
-        """Keep the newest status of each part."""
-        for status in message.status:
-            node, _, part = status.name.partition(': ')
-            self.at[node] = time.monotonic()
-            self.statuses[node] = {**self.statuses.get(node, {}), part: {
-                'level': int.from_bytes(status.level, 'little'),
-                'message': status.message,
-                'values': {each.key: each.value for each in status.values},
-            }}  # fmt: skip
-
-    def silence(self, name: str) -> float:
-        """How long nothing came from there, s."""
-        return time.monotonic() - self.at.get(name, -math.inf)
 
 
 class OperatedCell:
@@ -78,7 +56,7 @@ class OperatedCell:
         playing: The scenario that is played, None where none is.
     """
 
-    def __init__(self, node: Node, lathe: str, heard: Heard) -> None:
+    def __init__(self, node: Node, lathe: str, heard: DiagnosticsListener) -> None:
         """Subscribe, and get to know the services."""
         self.board, self._signals = Board(), LiveSignals()
         self.clients = CellClients(node, lathe, self.board.put)
@@ -102,7 +80,7 @@ class OperatedCell:
         topics = [
             (Bool, f'{monitor}/chatter', _LATCHED, self._on_flag),
             (String, f'{monitor}/state', _LATCHED, lambda message: put('state', message.data)),
-            (String, f'{supervisor}/action', usual, lambda message: put('action', message.data)),
+            (String, f'{supervisor}/action', _LATCHED, self._on_action),
         ]
         self._topics: list[tuple[PolledSubscription, Any, Callable[[Any], None]]] = [
             (PolledSubscription(node, kind, topic, qos), kind, take)
@@ -161,7 +139,7 @@ class OperatedCell:
             if len(block):
                 blocks.append(block)
         if blocks:
-            self._heard.at[self._samples_name] = time.monotonic()
+            self._heard.spoke(self._samples_name)
             self._add(blocks, columns)
             self.board.put('complaint', '')
 
@@ -180,6 +158,11 @@ class OperatedCell:
         if self._player is not None:
             found = [self._figures.get(n, (math.nan,))[0] for n in ('frequency', 'growth_rate')]
             self._player.on_flag(self._signals.time, *found, up=message.data)
+
+    def _on_action(self, message: String) -> None:
+        self.board.put('action', message.data)
+        if self._player is not None and ASKS in message.data:
+            self._player.hear(ASKED, self._signals.time)
 
     def add_sentence(self, entry: Mapping[str, Any]) -> None:
         """Show what one of the nodes logged."""
@@ -291,13 +274,16 @@ class OperatedCell:
         step = self._player.due(self._signals.time, recommended)
         if step is not None:
             self._show_scenario(f'{self.playing.name}: {step}.')
-            self._run(self._carry_out(dict(step.changes)))
+            self._run(self._carry_out(step))
         elif self._player.finished and self._signals.time >= self.playing.duration:
             self._end_scenario('is over')
 
-    async def _carry_out(self, changes: dict[str, Any]) -> None:
+    async def _carry_out(self, step: Step) -> None:
         try:
-            await self.clients.set('lathe', changes)
+            if step.accept:
+                await self.clients.call('accept')
+            else:
+                await self.clients.set('lathe', step.changes)
         except LatheChatterError as error:
             self._end_scenario(f'is stopped: {error}')
 

@@ -14,11 +14,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
+from std_srvs.srv import Trigger
 
 from lathe_chatter.errors import ScenarioFailedError
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step
 from lathe_chatter.scenario.player import ScenarioPlayer
+from lathe_chatter.scenario.scenario import ASKED
+from lathe_chatter.supervisor import ASKS
 
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -59,6 +62,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         self._client = self.create_client(
             SetParametersAtomically, 'lathe/set_parameters_atomically'
         )
+        self._accept = self.create_client(Trigger, 'chatter_supervisor/accept')
         self._decoder = SampleDecoder()
         self.create_subscription(
             Float64MultiArray, 'lathe/samples', self._on_samples, _NEWEST, raw=True
@@ -92,6 +96,8 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
 
     def _on_action(self, message: String) -> None:
         self._log(f'{self.time:7.2f} s  supervisor: {message.data}')
+        if ASKS in message.data:
+            self.player.hear(ASKED, self.time)
 
     def _on_state(self, message: String) -> None:
         self.state = message.data
@@ -114,21 +120,27 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
 
     def _play(self, step: Step) -> None:
         self._log(f'{self.time:7.2f} s  {step}')
+        self._in_flight = True
+        if step.accept:
+            future = self._accept.call_async(Trigger.Request())
+            future.add_done_callback(lambda done: self._on_answer(step, done))
+            return
         request = SetParametersAtomically.Request(
             parameters=[
                 Parameter(name, value=value).to_parameter_msg()
                 for name, value in step.changes.items()
             ]
         )
-        self._in_flight = True
         future = self._client.call_async(request)
         future.add_done_callback(lambda done: self._on_answer(step, done))
 
     def _on_answer(self, step: Step, future: Any) -> None:
         self._in_flight = False
-        result = future.result().result
-        if not result.successful:
-            self.failure = ScenarioFailedError(f'The lathe refused {step}: {result.reason}')
+        answer = future.result()
+        if step.accept and not answer.success:
+            self.failure = ScenarioFailedError(f'The supervisor refused: {answer.message}')
+        elif not (step.accept or answer.result.successful):
+            self.failure = ScenarioFailedError(f'The lathe refused {step}: {answer.result.reason}')
 
 
 def parameter_arguments(parameters: Mapping[str, Any]) -> list[str]:

@@ -23,8 +23,9 @@ from rclpy.serialization import deserialize_message
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.cut_events import on_the_shop_floor, parse_change
+from lathe_chatter.nodes.diagnostics import DiagnosticsListener
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.operated_cell import Heard, OperatedCell
+from lathe_chatter.nodes.operated_cell import OperatedCell
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameters import PAGE
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
@@ -58,7 +59,7 @@ class OperatorPageNode(ParameterNode):
         super().__init__('operator_page', PAGE, **options)
         values: Any = self.values
         self.server = PageServer(self, values['host'], values['port'], values['token'])
-        self.heard = Heard()
+        self.heard = DiagnosticsListener()
         self._board = Board()
         self._board.put('recorded', value=False)
         self._board.put('scenarios', sorted(shipped_scenarios()))

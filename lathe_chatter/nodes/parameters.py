@@ -178,6 +178,13 @@ SUPERVISOR = ParameterTable(
         ),
         *rows_of(Limits(), run_time=True),
         Row(
+            'machine_error',
+            0.03,
+            'relative standard error of the figures of the machine, with which moves reckon',
+            Quantity('', high=0.3),
+            run_time=True,
+        ),
+        Row(
             'hands_off',
             2.0,
             'seconds without any action after somebody else has changed something',

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -21,7 +22,7 @@ from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.model.parameters import cut_from, machine_from
-from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
@@ -29,7 +30,7 @@ from lathe_chatter.nodes.parameters import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
-from lathe_chatter.supervisor.moves import with_tool_at
+from lathe_chatter.supervisor.moves import may_be
 
 _LOOK_PERIOD = 0.02
 _SILENCE = 1.0
@@ -43,7 +44,6 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Two may come at once; who comes late has the newest."""
 _BELIEVED = {Works.FULL.value, Works.CORRECTED.value}
-_LATHE, _MONITOR = 'lathe', 'chatter_monitor'
 
 
 class SupervisorNode(ParameterNode):
@@ -62,15 +62,16 @@ class SupervisorNode(ParameterNode):
     def __init__(self, **options: Any) -> None:
         """Listen, and hold still until it is known who else is there."""
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
-        moves_for(Machine(), Cut(), Limits())  # compiled or loaded before there is any hurry
+        # Compiled or loaded before there is any hurry.
+        list(moves_for(may_be(Machine(), 0.01), Cut(), Limits()))
         self._core = self._new_core()
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
-        self._cutting_stiffness = self._tool_frequency = math.nan
-        self._chatter, self._state, self._works = False, '', ''
+        self._chatter, self._state = False, ''
         self._heard_at = self._lost_at = -math.inf
         self._lost = self._restarts = -1
-        self._lathe_values: dict[str, Any] = {}
-        self._monitor_values: dict[str, Any] = {}
+        self._reports = DiagnosticsListener()
+        self._told: dict[str, dict[str, Any]] = {}  # of lathe and monitor
+        self._cut_is_new = False  # for the monitor's figures
         self._sent: dict[str, Any] = {}
         self._cut: Cut | None = None
         self._machine: Machine | None = None
@@ -80,17 +81,19 @@ class SupervisorNode(ParameterNode):
         self._pause = self.create_client(SetBool, 'lathe/pause')
         self._lathe, self._monitor = (
             self.resolve_service_name(f'{name}/get_parameters').rpartition('/')[0]
-            for name in (_LATHE, _MONITOR)
+            for name in ('lathe', 'chatter_monitor')
         )
         self._remote = RemoteParameters(self, self._take_parameters)
         for name in _FIGURES:
-            self.create_subscription(
-                Float64, f'chatter_monitor/{name}', self._taker(name), QoSProfile(depth=1)
-            )
-        self.create_subscription(Bool, 'chatter_monitor/chatter', self._on_flag, _LATCHED)
-        self.create_subscription(String, 'chatter_monitor/state', self._on_state, _LATCHED)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-        self.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
+            take = partial(self._on_figure, name)
+            self.create_subscription(Float64, f'chatter_monitor/{name}', take, QoSProfile(depth=1))
+        for kind, topic, qos, hear in (
+            (Bool, 'chatter_monitor/chatter', _LATCHED, self._on_flag),
+            (String, 'chatter_monitor/state', _LATCHED, self._on_state),
+            (DiagnosticArray, '/diagnostics', QoSProfile(depth=10), self._on_diagnostics),
+            (ParameterEvent, '/parameter_events', QoSProfile(depth=100), self._on_event),
+        ):
+            self.create_subscription(kind, topic, hear, qos)
         topic = '~/action'
         self._action = self.create_publisher(
             String, topic, _SENTENCES, qos_overriding_options=publisher_overrides(self, topic)
@@ -114,30 +117,22 @@ class SupervisorNode(ParameterNode):
 
     def _new_core(self) -> Supervisor:
         values: Mapping[str, Any] = self.values
-        core = Supervisor(
-            _limits_of(values),
-            Mode(values['mode']),
-            margin_limit=values['margin_limit'],
-            move_early=values['move_early'],
-            hands_off=values['hands_off'],
-        )
+        names = ('machine_error', 'margin_limit', 'move_early', 'hands_off')
+        options = {name: values[name] for name in names}
+        core = Supervisor(_limits_of(values), Mode(values['mode']), **options)
         core.hand_moved(time.monotonic())
         return core
 
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Begin anew with what was set."""
         self._core = self._new_core()
-        self._core.machine = self._believed()
         self._say(f'From now on: {", ".join(f"{n} = {v}" for n, v in changed.items())}.')
 
     # -- listening -----------------------------------------------------------------------------
 
-    def _taker(self, name: str) -> Callable[[Float64], None]:
-        def take(message: Float64) -> None:
-            self._heard_at = time.monotonic()
-            self._figures[name] = message.data, self._heard_at
-
-        return take
+    def _on_figure(self, name: str, message: Float64) -> None:
+        self._heard_at = time.monotonic()
+        self._figures[name] = message.data, self._heard_at
 
     def _on_flag(self, message: Bool) -> None:
         self._chatter = message.data
@@ -146,62 +141,53 @@ class SupervisorNode(ParameterNode):
         self._state, self._heard_at = message.data, time.monotonic()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            values = {value.key: value.value for value in status.values}
-            if status.name == f'{self._monitor}: cut':
-                self._works = values.get('works with', '')
-                self._cutting_stiffness = float(values.get('C w, N/m', math.nan))
-                self._tool_frequency = float(values.get(TOOL_FREQUENCY, math.nan))
-                self._core.machine = self._believed()
-            elif status.name == f'{self._monitor}: samples' and 'samples lost' in values:
-                lost = int(values['samples lost'])
-                if lost > self._lost >= 0:
-                    self._lost_at = time.monotonic()
-                restarts = int(values.get('restarts of the lathe', 0))
-                if restarts > self._restarts >= 0:  # it may be another machine, and another cut
-                    self._cut, self._lathe_values = None, {}
-                    self._remote.want_again(self._lathe)
-                self._lost, self._restarts = lost, restarts
+        self._reports.take(message)
+        if not any(status.name.startswith(f'{self._monitor}: ') for status in message.status):
+            return
+        self._cut_is_new = False
+        samples = self._reports.values(self._monitor, 'samples')
+        lost = int(samples.get('samples lost', self._lost))
+        if lost > self._lost >= 0:
+            self._lost_at = time.monotonic()
+        restarts = int(samples.get('restarts of the lathe', 0))
+        if restarts > self._restarts >= 0:  # it may be another machine, and another cut
+            self._cut = None
+            self._told.pop(self._lathe, None)
+            self._remote.want_again(self._lathe)
+        self._lost, self._restarts = lost, restarts
 
     def _on_event(self, event: ParameterEvent) -> None:
         """Follow the lathe; what this node has not set somebody else has."""
-        if event.node != self._lathe or not self._lathe_values:
+        known = self._told.get(event.node)
+        if event.node != self._lathe or not known:
             return
         entries = (*event.new_parameters, *event.changed_parameters)
         values = {p.name: parameter_value_to_python(p.value) for p in entries}
-        changed = {n: v for n, v in values.items() if self._lathe_values.get(n) != v}
-        self._lathe_values |= changed
+        changed = {n: v for n, v in values.items() if known.get(n) != v}
         if any(self._sent.get(name) != value for name, value in changed.items()):
             self._say_of(self._core.hand_moved(time.monotonic()))
+        self._take_changes(changed)
+
+    def _take_changes(self, changed: Mapping[str, Any]) -> None:
+        """The lathe has changed."""
         if changed:
-            self._take_cut()
+            self._told[self._lathe] |= changed
+            self._cut = cut_from(self._told[self._lathe])
+            self._cut_is_new = True
 
     def _take_parameters(self, name: str, values: dict[str, Any]) -> None:
-        known = {n: v for n, v in values.items() if v is not None}
+        self._told[name] = {n: v for n, v in values.items() if v is not None}
+        told = self._told.get(self._monitor, {})
+        source = told.get('model', ModelSource.NONE.value)
+        if source == ModelSource.LATHE.value:
+            told = self._told.get(self._lathe, {})
         try:
             if name == self._lathe:
-                self._lathe_values = known
-                self._take_cut()
-            else:
-                self._monitor_values = known
-            source = self._monitor_values.get('model', ModelSource.NONE.value)
-            described = self._monitor_values
-            if source == ModelSource.LATHE.value:
-                described = self._lathe_values
-            if described and source != ModelSource.NONE.value:
-                self._machine = machine_from(described)
+                self._take_changes(self._told[name])
+            if told and source != ModelSource.NONE.value:
+                self._machine = machine_from(told)
         except LatheChatterError as error:
             self.get_logger().error(f'{name} does not say what it is: {error}')
-
-    def _take_cut(self) -> None:
-        self._cut = cut_from(self._lathe_values)
-        self._cutting_stiffness = math.nan  # of the cut before
-
-    def _believed(self) -> Machine | None:
-        """The machine as the monitor takes it, None where it believes none."""
-        if self._machine is None or self._works not in _BELIEVED:
-            return None
-        return with_tool_at(self._machine, self._tool_frequency)
 
     # -- acting --------------------------------------------------------------------------------
 
@@ -209,13 +195,18 @@ class SupervisorNode(ParameterNode):
         now = time.monotonic()
         # What is not known any more is not published any more.
         figures = {n: value for n, (value, at) in self._figures.items() if now < at + _SILENCE}
+        heard = self._reports.values(self._monitor, 'cut')
+        believed = heard.get('works with') in _BELIEVED
+        self._core.machine = self._machine if believed else None
+        stiffness = math.nan if self._cut_is_new else float(heard.get('C w, N/m', math.nan))
         return Seen(
             now,
             cut,
             self._chatter,
             **figures,
-            cutting_stiffness=self._cutting_stiffness,
-            spindle_acceleration=float(self._lathe_values.get('spindle_acceleration', 0.0)),
+            cutting_stiffness=stiffness,
+            tool_frequency=float(heard.get(TOOL_FREQUENCY, math.nan)),
+            spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             hindrance=self._hindrance(now),
         )
 
@@ -276,8 +267,7 @@ class SupervisorNode(ParameterNode):
                 reason = getattr(result, 'reason', getattr(result, 'message', ''))
                 self._say_of(self._core.refused(reason))
             elif changes is not None:
-                self._lathe_values |= changes
-                self._take_cut()
+                self._take_changes(changes)
 
         future.add_done_callback(answered)
 

@@ -120,7 +120,7 @@ class RecordedRun:
         try:
             await asyncio.to_thread(self._read_all)
             self._history = await asyncio.to_thread(read_history, self._path)
-            self._tell_history(self._history)
+            self._show_history(self._history)
         except LatheChatterError as error:
             self._show(float(self._times[-1]), f'What happened cannot be read: {error}')
 
@@ -262,7 +262,7 @@ class RecordedRun:
             self._chart_of = key, chart
         return self._chart_of[1]
 
-    def _tell_history(self, history: History) -> None:
+    def _show_history(self, history: History) -> None:
         """What happened, in order."""
         found = [(session.time, session.why) for session in history.later_sessions]
         for change in history.changes:

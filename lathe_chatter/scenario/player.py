@@ -19,12 +19,13 @@ class ScenarioPlayer:
         scenario: What is played.
 
     Attributes:
-        said: What the monitor has said so far: FLAGGED and CLEARED.
+        said: What was said so far: FLAGGED and CLEARED by the monitor, ASKED by a supervisor.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         """At the beginning."""
         self.said: list[str] = []
+        self._is_up = False
         self._steps = list(scenario.steps)
         self._said_before_step = 0
         self._said_at = 0.0
@@ -40,6 +41,11 @@ class ScenarioPlayer:
         at = self._steps[0].at if self._steps else None
         return math.inf if at is None else at
 
+    def hear(self, word: str, time: float) -> None:
+        """Take notice of a word that steps wait for, at a simulated time, s."""
+        self.said.append(word)
+        self._said_at = time
+
     def on_flag(self, time: float, frequency: float, growth_rate: float, *, up: bool) -> str:
         """Take notice of the monitor's flag.
 
@@ -52,11 +58,10 @@ class ScenarioPlayer:
         Returns:
             What that means, for people; empty where the flag is as it was.
         """
-        word = FLAGGED if up else CLEARED
-        if word == (self.said[-1] if self.said else CLEARED):
+        if up == self._is_up:
             return ''
-        self.said.append(word)
-        self._said_at = time
+        self._is_up = up
+        self.hear(FLAGGED if up else CLEARED, time)
         if not up:
             return 'flag cleared'
         figures = [f'{frequency:.1f} Hz'] if math.isfinite(frequency) else []

@@ -25,18 +25,20 @@ from lathe_chatter.model.quantities import Quantity
 
 RECOMMENDED = 'recommended'
 """Stands for the speed that the monitor recommends."""
-FLAGGED, CLEARED = 'flagged', 'cleared'
+FLAGGED, CLEARED, ASKED = 'flagged', 'cleared', 'asked'
+"""What a step may wait for: the monitor's flag, or a supervisor that asks."""
 _TIME = Quantity('a time', 's', high=86400.0)
 
 
 @dataclass(frozen=True)
 class Step:
-    """One change of parameters.
+    """One change of parameters, or the answer to a supervisor that asks.
 
     Attributes:
         changes: Parameter names of the node `lathe` with their new values, or `RECOMMENDED`.
         at: Simulated time of the change, s; None where it waits for the monitor.
-        when: `FLAGGED` or `CLEARED`: what the monitor must have said since the step before.
+        when: `FLAGGED`, `CLEARED` or `ASKED`: what must have been said since the step before.
+        accept: Whether the supervisor's offer is accepted, in place of a change.
         after: s of simulated time to let pass after that.
         because: Why, for the reader of the run.
     """
@@ -46,10 +48,12 @@ class Step:
     when: str | None = None
     after: float = 0.0
     because: str = ''
+    accept: bool = False
 
     def __str__(self) -> str:
         """What changes and why, in a line."""
         shown = ', '.join(f'{name} = {value}' for name, value in self.changes.items())
+        shown = 'the offer of the supervisor is accepted' if self.accept else shown
         return f'{shown}{self.because and f"  ({self.because})"}'
 
 
@@ -163,6 +167,8 @@ def load_scenario(path: Path) -> Scenario:
         supervisor=_mapping(raw, 'supervisor', where) if 'supervisor' in raw else None,
         expect=expect,
     )
+    if scenario.supervisor is None and any(s.accept or s.when == ASKED for s in scenario.steps):
+        raise ScenarioError(f'{where}: a step accepts what no supervisor asks: give supervisor.')
     _check_times(scenario, where)
     return scenario
 
@@ -206,21 +212,23 @@ def _step(entry: Any, where: str) -> Step:
     """One entry of the list of steps."""
     if not isinstance(entry, dict):
         raise ScenarioError(f'{where} must be a mapping with at or when, and set.')
-    _only(entry, {'at', 'when', 'after', 'set', 'because'}, where)
+    _only(entry, {'at', 'when', 'after', 'set', 'accept', 'because'}, where)
     if ('at' in entry) == ('when' in entry):
         raise ScenarioError(f'{where} must have either at (a time in s) or when.')
     when = entry.get('when')
-    if 'when' in entry and when not in {FLAGGED, CLEARED}:
-        raise ScenarioError(f'{where}: when is {when!r}: it must be {FLAGGED} or {CLEARED}.')
-    changes = _mapping(entry, 'set', where)
-    if not changes:
-        raise ScenarioError(f'{where}: set must name at least one parameter.')
+    if 'when' in entry and when not in {FLAGGED, CLEARED, ASKED}:
+        allowed = f'{FLAGGED}, {CLEARED} or {ASKED}'
+        raise ScenarioError(f'{where}: when is {when!r}: it must be {allowed}.')
+    changes, accept = _mapping(entry, 'set', where), entry.get('accept', False)
+    if not isinstance(accept, bool) or accept == bool(changes):
+        raise ScenarioError(f'{where}: it must set at least one parameter, or accept: true.')
     return Step(
         changes={name: _change(name, value, where) for name, value in changes.items()},
         at=_time(entry, 'at', where),
         when=when,
         after=_time(entry, 'after', where) or 0.0,
         because=str(entry.get('because', '')),
+        accept=accept,
     )
 
 

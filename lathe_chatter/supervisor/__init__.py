@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from lathe_chatter.supervisor.moves import Limits, Move, moves_for
-from lathe_chatter.supervisor.supervisor import Action, Mode, Seen, Supervisor
+from lathe_chatter.supervisor.supervisor import ASKS, Action, Mode, Seen, Supervisor
 
-__all__ = ['Action', 'Limits', 'Mode', 'Move', 'Seen', 'Supervisor', 'moves_for']
+__all__ = ['ASKS', 'Action', 'Limits', 'Mode', 'Move', 'Seen', 'Supervisor', 'moves_for']

@@ -1,49 +1,56 @@
-"""The moves that end chatter within limits: another speed, a varied speed, a smaller cut."""
+"""The moves that end chatter within limits: another speed, a varied speed, a smaller cut.
+
+No machine is told exactly, so machines are drawn that the truth may be, and a move has to suit
+them all; where none does, most of them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantities import check_fields, limits_of, quantity
+from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.stability import (
     ProcessDamping,
-    contact_at,
-    critical_depth,
+    critical_depths,
     floquet,
-    rightmost_root,
     rightmost_roots,
     seating_depth,
-    stable_speed_intervals,
 )
 
-_RESERVES = (0.25, 0.12, 0.04)
-"""Parts by which a deeper cut must be stable still, wished and needed."""
-_EDGE, _LEAST_EDGE = 0.08, 0.012
-"""Parts of a speed that it stays away from the edges of its stable speeds, wished and needed."""
-_DEPTHS = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5, 0.4, 0.3, 0.2, 0.1)
+_MACHINES, _VARIED = 32, 8
+"""Machines that the truth may be, and those of them that a varied speed has to suit."""
+_ODD = (0, 2, 6)
+"""Of the machines, those that a move need not suit: none, and more where there is no such move."""
+_SPEEDS = 240
+_RESERVE = 1.03
+"""By which a depth stays away from every limit."""
 _SHORT_WAY = 0.05
 """Part of the removal rate that a speed e times as far away has to be worth."""
+_ONE_CONTACT, _VARYING = 0.85, 0.9
+"""Worth of what suits one contact of the bearing alone, and of a varied speed."""
 _SURE_DECAY = -1.0
 """Growth rate below which a varied speed is believed to help, 1/s."""
-_ROUNDING = 1e-9
 _NEARLY_ALL = 0.9
 """Of the removal rate: a move that keeps it leaves no need to look for others than speeds."""
-_NEAREST = 4
-"""Intervals of stable speeds that are looked into, the nearest ones."""
 _SLOWEST_SWING = 0.2
 """Frequency of a variation below which none is tried, Hz."""
-_MOST_HEARD = 2.0
-"""Times the told C w that may be heard."""
 _SURGE = 5.0
 """Times that vibration may grow to while the varied speed passes where it grows."""
+_MOST_HEARD = 2.0
+"""Times the told C w that may be heard."""
+_FIT, _FIT_GROWTH = 0.004, 4.0
+"""Part of the frequency of chatter, and 1/s of its growth, within which it is that of the told
+machine: of machines told 5 % off a tenth fit so well."""
 _WAY = 24
 """Speeds on the way to another one that are looked at."""
 
@@ -99,14 +106,14 @@ class Move:
         growth_rate: Predicted there, the greater one of open and seated where both may be, 1/s.
         margin: By what fraction its depth may still grow; nan where the speed varies.
         kept: Of the removal rate, 1 for all.
-        worth: What moves are compared by.
+        share: Of the machines that the truth may be, those on which it is stable.
     """
 
     cut: Cut
     growth_rate: float
     margin: float
     kept: float
-    worth: float
+    share: float
 
     def changes_from(self, cut: Cut) -> dict[str, float]:
         """What has to be set, by name."""
@@ -122,241 +129,248 @@ def removal_rate(cut: Cut) -> float:
     return cut.depth_of_cut * cut.feed * cut.spindle_speed_rpm / 60.0
 
 
-class Regime(NamedTuple):
-    """A machine and whether its workpiece is seated."""
+def as_heard(
+    machine: Machine, cut: Cut, cutting_stiffness: float, tool_frequency: float
+) -> Machine:
+    """The machine with what is heard of it; nan where nothing is.
 
-    machine: Machine
-    seated: bool
-
-
-def regimes_of(machine: Machine, cut: Cut) -> tuple[Regime, ...]:
-    """What a cut may be: floating, seated or, across a clearance, both and in between.
-
-    Where it is seated for a part of each cycle, a part of the bearing carries.
-    """
-    floating, seated = Regime(machine, seated=False), Regime(machine, seated=True)
-    if cut.bearing_contact is BearingContact.NONE:
-        return (floating,)
-    if cut.bearing_contact is BearingContact.SEATED:
-        return (seated,)
-    half = replace(machine, bearing_stiffness=0.5 * machine.bearing_stiffness)
-    return floating, Regime(half, seated=True), seated
-
-
-def growth_of(regimes: tuple[Regime, ...], cut: Cut) -> float:
-    """The greatest predicted growth rate in some regimes, 1/s."""
-    if cut.speed_variation_amplitude:
-        return max(floquet(each.machine, cut, seated=each.seated).growth_rate for each in regimes)
-    at = cut.spindle_speed_rpm, cut.depth_of_cut
-    process = ProcessDamping.of(cut)
-    return max(
-        rightmost_root(each.machine, *at, seated=each.seated, process=process).real
-        for each in regimes
-    )
-
-
-def moves_for(machine: Machine, cut: Cut, limits: Limits, amplitude: float = 0.0) -> list[Move]:
-    """Moves that are predicted to end chatter, the one of greatest worth first.
-
-    A cut that chatters across a clearance is open and seated in turn, so a move suits both where
-    one does; else the contact that the mean force makes.
+    Chatter that leaves the cut makes C w look less than it is, and much more than was told is an
+    error: a cut begun a moment ago, or not this one.
 
     Args:
-        machine: As known, with C as known or heard.
+        machine: As told.
+        cut: That is heard.
+        cutting_stiffness: C w, N/m.
+        tool_frequency: Natural frequency of a tool with one mode, Hz.
+    """
+    told = machine.cutting_stiffness(cut.depth_of_cut)
+    if 0.0 < told < cutting_stiffness < _MOST_HEARD * told:
+        machine = replace(machine, cutting_coefficient=cutting_stiffness / cut.depth_of_cut)
+    if math.isfinite(tool_frequency) and len(machine.tool.modes) == 1:
+        omega = 2.0 * math.pi * tool_frequency
+        machine = replace(machine, tool=replace(machine.tool.modes[0], natural_frequency=omega))
+    return machine
+
+
+def fits(machine: Machine, cut: Cut, frequency: float, growth_rate: float) -> bool:
+    """Whether chatter that is heard, Hz and 1/s, is that of the machine as told."""
+    each = [_carried(machine, part) for part in _contacts(cut)[0][0]]
+    roots = rightmost_roots(
+        each, cut.spindle_speed_rpm, cut.depth_of_cut, seated=True, process=ProcessDamping.of(cut),
+        proven=False,
+    )  # fmt: skip
+    near = np.abs(roots.imag - 2.0 * math.pi * frequency) < _FIT * roots.imag
+    return bool((near & (np.abs(roots.real - growth_rate) < _FIT_GROWTH)).any())
+
+
+def may_be(machine: Machine, error: float) -> list[Machine]:
+    """Machines that the truth may be, the told one first.
+
+    Args:
+        machine: As told.
+        error: Relative standard error of every figure of it.
+    """
+    names = ('frequency', 'damping', 'stiffness', 'C')
+    uncertainty = uncertainty_from(','.join(f'{name}={error!r}' for name in names), machine)
+    drawn, _ = uncertainty.draw(machine, _MACHINES - 1 if error else 0)
+    parts = np.exp(error * np.random.default_rng(1).standard_normal(len(drawn)))
+    return [machine, *(_carried(each, part) for each, part in zip(drawn, parts, strict=True))]
+
+
+def _carried(machine: Machine, part: float) -> Machine:
+    """The machine with a part of its bearing's stiffness."""
+    return replace(machine, bearing_stiffness=float(part) * machine.bearing_stiffness)
+
+
+def chance_of(machines: Sequence[Machine], cut: Cut) -> float:
+    """The share of some machines on which a cut is stable, whatever its bearing does."""
+    parts, _ = _contacts(cut)[0]
+    each = np.array([[_carried(m, part) for part in parts] for m in machines], dtype=object)
+    depths = critical_depths(
+        each, cut.spindle_speed_rpm, seated=True, process=ProcessDamping.of(cut)
+    )
+    return float(np.mean(depths.min(axis=1) > cut.depth_of_cut))
+
+
+def moves_for(
+    machines: Sequence[Machine], cut: Cut, limits: Limits, amplitude: float = 0.0
+) -> Iterator[Move]:
+    """Moves that are predicted to end chatter, the one of greatest worth first.
+
+    A cut that chatters across a clearance is open and seated in turn, so a move that suits both
+    is worth more than one that suits the contact that the mean force makes.
+
+    Args:
+        machines: That the truth may be, the told one first, see `may_be`.
         cut: The present one.
         limits: That no move leaves.
         amplitude: Of the vibration now, m: it must not pass its limit on the way.
     """
-    process = ProcessDamping.of(cut)
-    found: list[Move] = []
     if not cut.depth_of_cut > 0.0:
-        return found
-    every = regimes_of(machine, cut)
-    single = [(each,) for each in every if each.machine == machine and len(every) > 1]
-    for regimes in (every, *single):
-        searches = [
-            _Search(cut, limits, amplitude, process, regimes, reserve) for reserve in _RESERVES
-        ]
-        for search in searches:
-            found += search.constant_speeds(_DEPTHS[:1])
-        if not any(move.kept > _NEARLY_ALL for move in found):
+        return
+    searches = [_Search(machines, cut, limits, *contact) for contact in _contacts(cut)]
+    passable = False
+    for odd in _ODD:
+        if passable or odd >= len(machines):
+            return
+        found = [offer for search in searches for offer in search.constant_speeds(odd)]
+        if not any(removal_rate(o.cut) > _NEARLY_ALL * removal_rate(cut) for o in found):
             for search in searches:
-                found += search.constant_speeds(_DEPTHS[1:])
-                found += [*search.varied_speeds(), *search.smaller_feeds()]
-                if found:
-                    break
-        if found:
-            return sorted(found, key=lambda move: -move.worth)
-    return found
+                found += [*search.smaller_feeds(odd), *search.varied_speeds(odd)]
+        for offer in sorted(found, key=lambda offer: -offer.worth):
+            if amplitude * offer.search.rise(offer.cut) <= limits.amplitude_limit:
+                passable = True
+                yield offer.search.move(offer.cut, 1.0 - odd / len(machines))
 
 
-@dataclass(frozen=True)
-class _Search:
-    """A cut for which another is looked for, that is stable in some regimes with a reserve."""
+def _contacts(cut: Cut) -> list[tuple[tuple[float, ...], int]]:
+    """What a cut may be on its bearing.
 
+    Returns:
+        The parts of the bearing's stiffness that carry: 0 while the workpiece floats, 1 while it
+        is seated, and some where it is seated for a part of each cycle; and the side of the
+        seating line, -1 below it, 1 above it, 0 for either.
+    """
+    if cut.bearing_contact in {BearingContact.NONE, BearingContact.SEATED}:
+        return [((float(cut.bearing_contact is BearingContact.SEATED),), 0)]
+    return [((0.0, 0.5, 1.0), 0), ((0.0,), -1), ((1.0,), 1)]
+
+
+class _Offer(NamedTuple):
+    """What a cut is worth, the cut, and who has found it."""
+
+    worth: float
     cut: Cut
-    limits: Limits
-    amplitude: float
-    process: ProcessDamping
-    regimes: tuple[Regime, ...]
-    reserve: float
+    search: _Search
 
-    def constant_speeds(self, parts: Sequence[float]) -> list[Move]:
-        """Speeds at parts of the present depth, from the deepest that has some."""
-        found: list[Move] = []
-        deepest = self.cut.depth_of_cut
-        for part in parts:
-            depth = part * deepest
-            if depth < self.limits.smallest_depth and part < 1.0:
-                break
-            speeds = [
-                self._inside(*each)
-                for each in self._intervals((1.0 + self.reserve) * depth).tolist()
-            ]
-            away = {rpm: abs(math.log(rpm / self.cut.spindle_speed_rpm)) for rpm, _ in speeds}
-            for rpm, edge in sorted(speeds, key=lambda speed: away[speed[0]])[:_NEAREST]:
-                if edge < _LEAST_EDGE:
-                    continue
-                if part < 1.0:  # between two of the depths
-                    depth = self._critical_depth(rpm) / (1.001 + self.reserve)
-                    depth = min(max(depth, part * deepest), deepest)
-                changes = {'spindle_speed_rpm': rpm, 'depth_of_cut': depth}
-                found += self._move(changes, min(edge / _EDGE, 1.0))
-            if any(move.kept >= part - 0.05 for move in found):
-                break
-        return found
 
-    def varied_speeds(self) -> Iterator[Move]:
-        """The largest variations that the spindle can follow, around the present speed."""
-        rpm, largest = self.cut.spindle_speed_rpm, self.limits.largest_variation
-        highest = limits_of(Cut, 'speed_variation_frequency').high
-        for amplitude in (0.5 * largest, largest) if largest else ():
-            low, high = rpm * (1.0 - amplitude), rpm * (1.0 + amplitude)
-            if self.limits.slowest_speed <= low and high <= self.limits.fastest_speed:
-                frequency = self.limits.ramp / (2.0 * math.pi * amplitude * rpm)
-                if frequency < _SLOWEST_SWING:
-                    continue
-                changes = {
-                    'speed_variation_amplitude': amplitude,
-                    'speed_variation_frequency': min(frequency, 0.1 * highest),
-                }
-                yield from self._move(changes, 0.9)
+class _Search:
+    """Looks for another cut that is stable in some contact with the bearing."""
 
-    def smaller_feeds(self) -> Iterator[Move]:
+    def __init__(
+        self, machines: Sequence[Machine], cut: Cut, limits: Limits, parts: Sequence[float],
+        side: int,
+    ) -> None:  # fmt: skip
+        """Compute the limits of all machines, in order at each speed."""
+        self._cut, self._limits, self._side = cut, limits, side
+        self._process = ProcessDamping.of(cut)
+        self._machines = [[_carried(machine, part) for part in parts] for machine in machines]
+        low, high = limits.slowest_speed, limits.fastest_speed
+        # Whole numbers, as a machinist would set them, and the present one.
+        even = np.round(60.0 / np.linspace(60.0 / high, 60.0 / low, _SPEEDS))
+        speeds = np.unique([*even, cut.spindle_speed_rpm])
+        self._speeds: Array = speeds[(speeds >= low) & (speeds <= high)]
+        self._feed = np.full(self._speeds.shape, cut.feed_per_revolution)
+        if not cut.feed_per_revolution:
+            self._feed = 60.0 * cut.feed_speed / self._speeds
+        each = np.array(self._machines, dtype=object)[:, :, None]
+        depths = critical_depths(each, self._speeds, seated=True, process=self._process)
+        self._deepest: Array = np.sort(depths.min(axis=1), axis=0) / _RESERVE
+        # A seating line is inverse to the feed.
+        line = [seating_depth(machine, cut.bearing_clearance, 1.0) for machine in machines]
+        self._line: Array = np.sort(line)[:, None] / np.maximum(self._feed, 1e-30)
+
+    def _suits(self, odd: int) -> tuple[Array, Array]:
+        """Above which depth, and up to which, all machines but some are stable, at each speed."""
+        deepest = self._deepest[odd]
+        if self._side < 0:
+            deepest = np.minimum(deepest, self._line[odd] / _RESERVE)
+        shallowest = self._line[-1 - odd] * _RESERVE if self._side > 0 else np.zeros_like(deepest)
+        return shallowest, deepest
+
+    def _at_present(self, values: Array) -> float:
+        """Of values at each speed, that at the present one; nan where that is not allowed."""
+        here = values[self._speeds == self._cut.spindle_speed_rpm]
+        return float(here[0]) if here.size else math.nan
+
+    def constant_speeds(self, odd: int) -> Iterator[_Offer]:
+        """Speeds, each with the greatest depth that suits all machines but some."""
+        cut, limits = self._cut, self._limits
+        shallowest, deepest = self._suits(odd)
+        depth = np.minimum(deepest, cut.depth_of_cut)
+        allowed = (depth > shallowest) & (depth >= min(limits.smallest_depth, cut.depth_of_cut))
+        # A faster spindle turns more often while the feed speed stays.
+        allowed &= self._feed >= min(limits.smallest_feed, cut.feed)
+        kept = depth * self._feed * self._speeds / 60.0 / max(removal_rate(cut), 1e-30)
+        away = np.abs(np.log(self._speeds / cut.spindle_speed_rpm))
+        worth = np.minimum(kept, 1.0) * (_ONE_CONTACT if self._side else 1.0) - _SHORT_WAY * away
+        worth = np.where(allowed, worth, -np.inf)
+        beside = np.pad(worth, 1, constant_values=-np.inf)
+        best = allowed & (worth >= beside[:-2]) & (worth >= beside[2:])
+        for k in np.flatnonzero(best).tolist():
+            changes = {'spindle_speed_rpm': self._speeds[k], 'depth_of_cut': depth[k]}
+            yield self._offer(worth[k], changes)
+
+    def smaller_feeds(self, odd: int) -> Iterator[_Offer]:
         """The largest feed at which the mean force leaves the workpiece floating."""
-        cut = self.cut
-        machine, seated = self.regimes[0]
-        if seated or not self._is_one_of_several():
-            return
-        seats = seating_depth(machine, cut.bearing_clearance, cut.feed)
-        part = seats / cut.depth_of_cut / (1.0 + 2.0 * self.reserve)
-        if part < 1.0 and part * cut.feed >= self.limits.smallest_feed:
+        cut = self._cut
+        part = self._at_present(self._line[odd]) / _RESERVE / cut.depth_of_cut
+        stable = self._at_present(self._deepest[odd]) >= cut.depth_of_cut
+        if self._side < 0 and stable and self._limits.smallest_feed / cut.feed <= part < 1.0:
             name = 'feed_per_revolution' if cut.feed_per_revolution else 'feed_speed'
-            yield from self._move({name: part * getattr(cut, name)}, 0.8)
+            yield self._offer(part * _ONE_CONTACT, {name: part * getattr(cut, name)})
 
-    def _intervals(self, depth: float) -> Array:
-        """The speeds at which a depth is stable in all regimes (n, 2), rev/min."""
-        common = np.array([[self.limits.slowest_speed, self.limits.fastest_speed]])
-        for machine, seated in self.regimes:
-            found = stable_speed_intervals(
-                machine, depth, seated=seated, process=self.process,
-                low_rpm=self.limits.slowest_speed, high_rpm=self.limits.fastest_speed,
-            )  # fmt: skip
-            low = np.maximum(common[:, None, 0], found[None, :, 0]).ravel()
-            high = np.minimum(common[:, None, 1], found[None, :, 1]).ravel()
-            common = np.stack((low, high), axis=1)[low < high]
-        return common
+    def varied_speeds(self, odd: int) -> Iterator[_Offer]:
+        """The largest variations that the spindle can follow, around the present speed."""
+        cut, limits, rpm = self._cut, self._limits, self._cut.spindle_speed_rpm
+        shallowest, _ = self._suits(odd)
+        floats = self._side >= 0 or self._at_present(self._line[odd]) > cut.depth_of_cut
+        if not (floats and cut.depth_of_cut > self._at_present(shallowest)):
+            return
+        highest = 0.1 * limits_of(Cut, 'speed_variation_frequency').high
+        for amplitude in {0.5 * limits.largest_variation, limits.largest_variation} - {0.0}:
+            swing = amplitude * rpm
+            frequency = min(limits.ramp / (2.0 * math.pi * swing), highest)
+            fits = limits.slowest_speed <= rpm - swing and rpm + swing <= limits.fastest_speed
+            if fits and frequency >= _SLOWEST_SWING:
+                changes = {'speed_variation_amplitude': amplitude,
+                           'speed_variation_frequency': frequency}  # fmt: skip
+                new = cut.with_changes(**changes)
+                if self.rise(new) < _SURGE and all(
+                    self._growth(number, new) < _SURE_DECAY
+                    for number in range(min(_VARIED, len(self._machines)))
+                ):
+                    yield self._offer(_VARYING * (_ONE_CONTACT if self._side else 1.0), changes)
 
-    def _inside(self, low: float, high: float) -> tuple[float, float]:
-        """The speed of an interval that is nearest to the present one, and its relative edge."""
-        ends = (low, high)
-        if low > self.limits.slowest_speed * (1.0 + _ROUNDING):
-            ends = (low * (1.0 + _EDGE), high)
-        if high < self.limits.fastest_speed * (1.0 - _ROUNDING):
-            ends = (ends[0], high * (1.0 - _EDGE))
-        if ends[0] >= ends[1]:
-            return 0.5 * (low + high), (high - low) / (high + low)
-        present = self.cut.spindle_speed_rpm
-        # A whole number, as a machinist would set it.
-        near = min(max(present, ends[0]), ends[1])
-        return near if near == present else float(round(near)), _EDGE
+    def _offer(self, worth: float, changes: Mapping[str, float]) -> _Offer:
+        numbers = {name: float(value) for name, value in changes.items()}
+        return _Offer(float(worth), self._cut.with_changes(**numbers), self)
 
-    def _move(self, changes: dict[str, float], sureness: float) -> Iterator[Move]:
-        """A move to a changed cut, if it is stable there, and on the way."""
-        new = self.cut.with_changes(**changes)
-        if new.feed < min(self.limits.smallest_feed, self.cut.feed):
-            return  # a faster spindle turns more often while the feed speed stays
-        deeper = new.with_changes(depth_of_cut=(1.0 + self.reserve) * new.depth_of_cut)
-        varied = new.speed_variation_amplitude > 0.0
-        machine, seated = self.regimes[0]
-        if self._is_one_of_several() and any(
-            contact_at(machine, each).seated is not seated for each in (new, deeper)
-        ):
-            return
-        if growth_of(self.regimes, deeper) > (_SURE_DECAY if varied else 0.0):
-            return
-        rise = self._rise(new)
-        if self.amplitude * rise > self.limits.amplitude_limit or (varied and rise > _SURGE):
-            return
+    def move(self, new: Cut, share: float) -> Move:
+        """What is predicted of a cut."""
         margin = math.nan
-        if not varied:
-            margin = self._critical_depth(new.spindle_speed_rpm) / new.depth_of_cut - 1.0
-        before = removal_rate(self.cut)
-        kept = min(removal_rate(new) / before, 1.0) if before else 1.0
-        away = abs(math.log(new.spindle_speed_rpm / self.cut.spindle_speed_rpm))
-        sureness *= min(0.7 + 2.0 * self.reserve, 1.0)
-        worth = kept * (0.5 + 0.5 * sureness) - _SHORT_WAY * away
-        yield Move(new, growth_of(self.regimes, new), margin, kept, worth)
+        if not new.speed_variation_amplitude:
+            depths = critical_depths(
+                self._machines[0], new.spindle_speed_rpm, seated=True, process=self._process
+            )
+            margin = float(depths.min()) / new.depth_of_cut - 1.0
+        kept = min(removal_rate(new) / max(removal_rate(self._cut), 1e-30), 1.0)
+        return Move(new, self._growth(0, new), margin, kept, share)
 
-    def _is_one_of_several(self) -> bool:
-        """Whether the regime is only that of the mean force, and holds while this does."""
-        return len(self.regimes) < len(regimes_of(self.regimes[0].machine, self.cut))
+    def _growth(self, number: int, new: Cut) -> float:
+        """The greatest growth rate of one of the machines, 1/s."""
+        if new.speed_variation_amplitude:
+            return max(floquet(m, new, seated=True).growth_rate for m in self._machines[number])
+        return float(self._rates(number, new.spindle_speed_rpm, new.depth_of_cut).max())
 
-    def _critical_depth(self, rpm: float) -> float:
-        """The smallest of the regimes, m."""
-        return min(
-            critical_depth(machine, rpm, seated=seated, process=self.process)
-            for machine, seated in self.regimes
+    def _rates(self, number: int, rpm: ArrayLike, depth: float) -> Array:
+        """Growth rates of one of the machines at constant speeds, 1/s (n,)."""
+        each = np.array(self._machines[number], dtype=object)[:, None]
+        roots = rightmost_roots(
+            each, np.atleast_1d(rpm), depth, seated=True, process=self._process, proven=False
         )
+        return np.asarray(roots.real.max(axis=0))
 
-    def _rise(self, new: Cut) -> float:
+    def rise(self, new: Cut) -> float:
         """How many times its amplitude the vibration may grow to while the speed changes."""
-        rpm = self.cut.spindle_speed_rpm, new.spindle_speed_rpm
-        lasting = abs(rpm[1] - rpm[0]) / self.limits.ramp / _WAY
+        rpm = self._cut.spindle_speed_rpm, new.spindle_speed_rpm
+        lasting = abs(rpm[1] - rpm[0]) / self._limits.ramp / _WAY
         on_the_way = np.linspace(*rpm, _WAY)
         if swing := new.speed_variation_amplitude:  # and while it varies
             lasting = 1.0 / new.speed_variation_frequency / _WAY
-            turn = np.linspace(0.0, 4.0 * np.pi, 2 * _WAY)
-            on_the_way = rpm[1] * (1.0 + swing * np.sin(turn))
-        rates = [
-            rightmost_roots(
-                machine, on_the_way, new.depth_of_cut, seated=seated, process=self.process,
-                proven=False,
-            ).real
-            for machine, seated in self.regimes
-        ]  # fmt: skip
+            on_the_way = rpm[1] * (1.0 + swing * np.sin(np.linspace(0.0, 4.0 * np.pi, 2 * _WAY)))
         grown = highest = 0.0
-        for rate in np.max(rates, axis=0) * lasting:
+        for rate in self._rates(0, on_the_way, new.depth_of_cut) * lasting:
             grown = max(grown + rate, 0.0)
             highest = max(highest, grown)
         return math.exp(min(highest, 50.0))
-
-
-def heard(machine: Machine, cut: Cut, cutting_stiffness: float) -> Machine:
-    """The machine with the C that is heard, where it is greater than what was told.
-
-    Chatter that leaves the cut makes C w look less than it is. Much more than was told is an
-    error: a cut begun a moment ago, or not this one.
-    """
-    told = machine.cutting_stiffness(cut.depth_of_cut)
-    if not 0.0 < told < cutting_stiffness < _MOST_HEARD * told:
-        return machine
-    return replace(machine, cutting_coefficient=cutting_stiffness / cut.depth_of_cut)
-
-
-def with_tool_at(machine: Machine, frequency: float) -> Machine:
-    """The machine whose tool is heard at a natural frequency, Hz; as told where that is nan."""
-    if not math.isfinite(frequency) or len(machine.tool.modes) > 1:
-        return machine
-    tool = replace(machine.tool.modes[0], natural_frequency=2.0 * math.pi * frequency)
-    return replace(machine, tool=tool)

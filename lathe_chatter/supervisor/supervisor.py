@@ -7,9 +7,19 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from itertools import chain
+from statistics import median
 
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.supervisor.moves import Limits, Move, heard, moves_for
+from lathe_chatter.supervisor.moves import (
+    Limits,
+    Move,
+    as_heard,
+    chance_of,
+    fits,
+    may_be,
+    moves_for,
+)
 
 _SETTLING, _LONGEST = 0.5, 2.0
 """s from a move to the judgement whether the vibration falls, and from that to the next."""
@@ -17,10 +27,21 @@ _AGAIN = 1.0
 """s after which it looks for a move again, where it could not make one."""
 _EFOLDS = 1.5
 """Of the predicted decay, before that judgement."""
-_FALLING = 0.9
-"""Part to which the vibration must have fallen meanwhile, where chatter is said to die."""
-_FALLEN = 0.5
-"""Part of what it was at the move, to which it must have fallen where it falls no more."""
+_FALLING, _FALLEN = 0.9, 0.5
+"""Part to which vibration falls meanwhile where chatter dies; and of what it was at the move, to
+which it has fallen where it falls no more."""
+_GROWN, _GROWING, _STANDING = 4.0, 2.2, 1.4
+"""Times the vibration of the quiet cut before, that it has whatever is known of its growth; where
+it is known to grow; and where it does under a flag that stands for _LONG. Else the flag is waited
+on, for noise raises it at times."""
+_LONG = 1.5
+"""s."""
+_UNEXPECTED = 8.0
+"""Times the vibration of the quiet cut where most machines that it may be are stable there."""
+_SURELY = 0.1
+"""s that it must have had that, and not fallen: what a change of the cut stirs up falls soon."""
+_LOOKS = 200
+"""At a quiet cut, that tell its vibration."""
 _BEYOND = 0.2
 """s that vibration must be beyond its limit, and not fall, for a stop."""
 _STEP, _LONGEST_STEP = 0.02, 0.08
@@ -29,8 +50,14 @@ _LASTING = 1.0
 """s that a margin must lie below its limit."""
 _SAME = 0.01
 """Part by which cuts must differ of which one was tried."""
+_SURER = 0.3
+"""Part of the error of the machine that is left where what is heard is what it predicts."""
 _DOUBT, _MOST_DOUBT = 1.25, 2.0
 """Times its C w that a cut is taken to have after every move that was no cure, and at most."""
+
+
+ASKS = '~/accept does it'
+"""In the sentence of a supervisor that asks."""
 
 
 class Mode(str, Enum):
@@ -54,6 +81,7 @@ class Seen:
         amplitude: Of the tool, m.
         margin: By what fraction the depth may grow.
         cutting_stiffness: C w as the monitor identified it, N/m.
+        tool_frequency: That the monitor has put in the place of the told one, Hz.
         spindle_acceleration: At which the spindle follows a change, rev/min per s; 0: at once.
         hindrance: Why nothing may be done, as the end of a sentence; empty where it may.
     """
@@ -66,6 +94,7 @@ class Seen:
     amplitude: float = math.nan
     margin: float = math.nan
     cutting_stiffness: float = math.nan
+    tool_frequency: float = math.nan
     spindle_acceleration: float = 0.0
     hindrance: str = ''
 
@@ -87,21 +116,13 @@ class Action:
     settling: float = _SETTLING
 
 
-@dataclass(frozen=True)
-class _Ramp:
-    """The spindle is on its way."""
-
-    rpm: float
-    target: float
-    time: float
-
-
 class Supervisor:
     """Decides about one machine.
 
     Args:
         limits: That nothing overrides.
         mode: See `Mode`.
+        machine_error: Relative standard error of the figures of the machine.
         margin_limit: Margin below which it warns.
         move_early: Whether it also moves then, in the mode `act`.
         hands_off: s without any action after a person has changed something.
@@ -111,21 +132,23 @@ class Supervisor:
         moves: Made by itself against the present chatter.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 -- its parameters
         self,
         limits: Limits,
         mode: Mode = Mode.SHADOW,
         *,
+        machine_error: float = 0.03,
         margin_limit: float = 0.1,
         move_early: bool = False,
         hands_off: float = 2.0,
     ) -> None:
         """See nothing yet."""
         self.machine: Machine | None = None
-        self.limits, self.mode = limits, mode
+        self.limits, self.mode, self._machine_error = limits, mode, machine_error
         self._margin_limit, self._move_early, self._hands_off = margin_limit, move_early, hands_off
         self._hand_at = -math.inf
         self._levels: deque[tuple[float, float]] = deque()
+        self._quiet_levels: deque[float] = deque(maxlen=_LOOKS)
         self._safe_since = math.nan
         self._warned, self._doubt = False, 1.0
         self._forget()
@@ -133,26 +156,27 @@ class Supervisor:
     def _forget(self) -> None:
         """There is no chatter."""
         self.moves = self._doubted = 0
+        self._fits = False
+        self._chance: tuple[Cut, float] | None = None  # that a cut is stable
         self._alarm_at = math.nan
         self._tried: list[Cut] = []
-        self._offer: tuple[Cut, Action, float] | None = None
-        self._ramp: _Ramp | None = None
+        self._offer: tuple[Cut, Action] | None = None
+        self._target = math.nan  # of a ramp under way
         self._next_step = self._judge_at = -math.inf
         self._at_move, self._settling = math.nan, _SETTLING
         self._refusal = self._said = ''
 
     def hand_moved(self, time: float) -> Action | None:
         """Somebody else has changed something: hands off, and what was planned is forgotten."""
-        self._hand_at, on_the_way = time, self._ramp is not None
-        self._offer = self._ramp = None
-        self._refusal = ''
+        on_the_way = math.isfinite(self._target)
+        self._hand_at, self._offer, self._target, self._refusal = time, None, math.nan, ''
         if not on_the_way:
             return None
         return Action('Somebody else changes the cut: the speed stays where it is on its way.')
 
     def refused(self, reason: str) -> Action:
         """The lathe did not do what was asked: no more is tried against this chatter."""
-        self._ramp = self._offer = None
+        self._offer, self._target = None, math.nan
         self._refusal = f'the lathe refused: {reason.rstrip(".")}'
         return Action(f'Nothing more is done, for {self._refusal}.')
 
@@ -160,7 +184,7 @@ class Supervisor:
         """A person says yes to the offer: whether there is one, why not, and what is done."""
         if self._offer is None:
             return False, 'Nothing is waiting to be accepted.', None
-        cut, action, _ = self._offer
+        cut, action = self._offer
         hindrance = self._hindrance(seen)
         if hindrance or cut != seen.cut:
             self._offer = None
@@ -172,7 +196,7 @@ class Supervisor:
         self._levels.append((seen.time, seen.amplitude))
         while self._levels[0][0] < seen.time - _SETTLING:
             self._levels.popleft()
-        if self._ramp is not None:
+        if math.isfinite(self._target):
             return self._go_on(seen)
         if seen.chatter:
             return self._chatter(seen)
@@ -196,13 +220,15 @@ class Supervisor:
         if self.moves and self._dies(seen):
             self._judge_at = seen.time + _SETTLING
             return None
+        if not (self.moves or self._is_sure(seen)):
+            return None
         return self._move(seen, _figures(seen))
 
     def _move(self, seen: Seen, why: str) -> Action | None:
         """The best move that was not tried."""
         if self.machine is None:
             return None
-        machine = heard(self.machine, seen.cut, seen.cutting_stiffness)
+        machine = as_heard(self.machine, seen.cut, seen.cutting_stiffness, seen.tool_frequency)
         if self.moves > self._doubted:  # the machine is not as it was told
             self._doubted = self.moves
             self._doubt = min(_DOUBT * self._doubt, _MOST_DOUBT)
@@ -210,8 +236,12 @@ class Supervisor:
         machine = replace(machine, cutting_coefficient=coefficient)
         amplitude = seen.amplitude if math.isfinite(seen.amplitude) else 0.0
         self._judge_at = seen.time + _AGAIN
-        for move in moves_for(machine, seen.cut, self.limits, amplitude):
-            if not any(_same(move.cut, cut) for cut in self._tried):
+        errors = (self._machine_error, _SURER * self._machine_error)[: 1 + self._fits]
+        found = (
+            moves_for(may_be(machine, error), seen.cut, self.limits, amplitude) for error in errors
+        )
+        for move in chain.from_iterable(found):
+            if not any(_same(move.cut, cut) for cut in (seen.cut, *self._tried)):
                 changes = move.changes_from(seen.cut)
                 said = f'{why}: {{}} set {_changes(changes, seen.cut)} ({_expected(move)})'
                 settling = min(_SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
@@ -221,55 +251,54 @@ class Supervisor:
 
     def _decide(self, seen: Seen, action: Action, cut: Cut | None = None) -> Action | None:
         """Act, or say what would be done, as the mode has it."""
-        out_of_moves = self.moves >= self.limits.most_moves and not action.stop
-        if self.mode is Mode.ACT and not out_of_moves:
-            self._tried += [cut] if cut is not None else []
-            return self._begin(replace(action, sentence=action.sentence.format('I') + '.'), seen)
-        offered = replace(action, sentence=action.sentence.format('I') + ', as was accepted.')
+
+        def said(who: str, end: str) -> str:
+            return action.sentence.format(who) + end
+
+        self._offer = None
         if self.mode is Mode.SHADOW:
-            self._offer = None
-            return self._once(action.sentence.format('I would') + ', but only watch.')
-        self._offer = seen.cut, offered, seen.time
+            return self._once(said('I would', ', but only watch.'))
         self._tried += [cut] if cut is not None else []
-        spent = f' {self.moves} moves were no cure.' if out_of_moves and self.moves else ''
-        return self._once(action.sentence.format('I would') + f': ~/accept does it.{spent}')
+        spent = self.moves >= self.limits.most_moves and not action.stop
+        if self.mode is Mode.ACT and not spent:
+            return self._begin(replace(action, sentence=said('I', '.')), seen)
+        self._offer = seen.cut, replace(action, sentence=said('I', ', as was accepted.'))
+        tried = f' {self.moves} moves were no cure.' if spent and self.moves else ''
+        return self._once(said('I would', f': {ASKS}.{tried}'))
 
     def _begin(self, action: Action, seen: Seen) -> Action:
         """Do it: at once, or the first step of a ramp."""
         self._offer, self._said = None, ''
         self.moves += 1
-        changes = dict(action.changes)
-        target = changes.get('spindle_speed_rpm')
         self._at_move = seen.amplitude
         self._settling = math.inf if action.stop else action.settling
         self._judge_at = seen.time + self._settling
+        target = action.changes.get('spindle_speed_rpm')
         if target is None:
             return action
-        start, own = seen.cut.spindle_speed_rpm, seen.spindle_acceleration
+        own = seen.spindle_acceleration
         if 0.0 < own <= self.limits.ramp:  # the spindle ramps by itself
-            self._judge_at += abs(target - start) / own
+            self._judge_at += abs(target - seen.cut.spindle_speed_rpm) / own
             return action
-        self._ramp = _Ramp(start, target, seen.time)
-        self._next_step = seen.time
+        self._target, self._next_step = target, seen.time
+        self._reached, self._reached_at = seen.cut.spindle_speed_rpm, seen.time
         first = self._go_on(seen)
-        changes |= first.changes if first is not None else {}
-        return replace(action, changes=changes)
+        return replace(action, changes={**action.changes, **(first.changes if first else {})})
 
     def _go_on(self, seen: Seen) -> Action | None:
         """The next speed of the ramp, if it is due."""
-        ramp = self._ramp
-        if ramp is None or seen.time < self._next_step:
+        if seen.time < self._next_step:
             return None
         self._next_step = seen.time + _STEP
         # Where looks come late the ramp takes longer: it has no greater steps for that.
-        lasted = min(seen.time - ramp.time + _STEP, _LONGEST_STEP)
-        step, left = self.limits.ramp * lasted, ramp.target - ramp.rpm
-        rpm = ramp.rpm + math.copysign(min(step, abs(left)), left)
-        self._ramp = _Ramp(rpm, ramp.target, seen.time + _STEP)
+        step = self.limits.ramp * min(seen.time - self._reached_at + _STEP, _LONGEST_STEP)
+        left = self._target - self._reached
+        self._reached += math.copysign(min(step, abs(left)), left)
+        self._reached_at = seen.time + _STEP
         if step >= abs(left):
-            self._ramp, rpm = None, ramp.target
+            self._reached, self._target = self._target, math.nan
             self._judge_at = seen.time + self._settling
-        return Action(changes={'spindle_speed_rpm': rpm})
+        return Action(changes={'spindle_speed_rpm': self._reached})
 
     def _hindrance(self, seen: Seen) -> str:
         """Why nothing may be done."""
@@ -283,6 +312,38 @@ class Supervisor:
             return 'the amplitude is not known'
         return ''
 
+    def _dies(self, seen: Seen) -> bool:
+        """Whether the vibration falls, or has fallen since the move and grows no more."""
+        if seen.amplitude < _FALLING * self._levels[0][1]:
+            return True
+        return seen.amplitude < _FALLEN * self._at_move and not seen.growth_rate > 0.0
+
+    def _is_sure(self, seen: Seen) -> bool:
+        """Whether the vibration is more than noise; so where no quiet cut was seen before."""
+        if self.machine is None:
+            return True
+        if self._chance is None or self._chance[0] != seen.cut:
+            machines = may_be(self.machine, self._machine_error)
+            self._chance = seen.cut, chance_of(machines, seen.cut)
+        lasted = seen.time - self._alarm_at
+        if lasted < _SURELY:
+            # Before it has grown so far that the tool leaves the cut.
+            self._fits |= fits(self.machine, seen.cut, seen.frequency, seen.growth_rate)
+            return False
+        recent = [level for time, level in self._levels if time > seen.time - _SURELY]
+        grows = _STANDING if lasted > _LONG else _GROWING
+        times = grows if seen.growth_rate > 0.0 else _GROWN
+        times = _UNEXPECTED if self._chance[1] > 0.5 else times
+        enough = not self._quiet_levels or min(recent) > times * median(self._quiet_levels)
+        return enough and seen.amplitude > _FALLING * recent[0]
+
+    def _is_beyond(self, seen: Seen) -> bool:
+        """Whether the vibration is beyond its limit, and stays there."""
+        recent = [level for time, level in self._levels if time > seen.time - _BEYOND]
+        lasting = self._levels[0][0] <= seen.time - _BEYOND
+        beyond = lasting and min(recent) > self.limits.amplitude_limit
+        return beyond and seen.amplitude > _FALLING * recent[0]
+
     # -- no chatter --------------------------------------------------------------------------
 
     def _quiet(self, seen: Seen) -> Action | None:
@@ -292,8 +353,9 @@ class Supervisor:
             self._forget()
             word = 'move' if moves == 1 else 'moves'
             return Action(f'The chatter has ended, {lasted:.1f} s after the flag; {moves} {word}.')
-        low = seen.margin < self._margin_limit
-        if not low:
+        if math.isfinite(seen.amplitude):
+            self._quiet_levels.append(seen.amplitude)
+        if not seen.margin < self._margin_limit:
             self._safe_since = math.nan
             self._warned &= not seen.margin > 1.5 * self._margin_limit
             return None
@@ -308,8 +370,6 @@ class Supervisor:
             return Action(f'{why}.')
         return self._move(seen, why)
 
-    # -- words -------------------------------------------------------------------------------
-
     def _once(self, sentence: str) -> Action | None:
         """A sentence, unless the same was the last one: figures do not make it another."""
         kind = ''.join(letter for letter in sentence if not (letter.isdigit() or letter in '.-+'))
@@ -317,22 +377,6 @@ class Supervisor:
             return None
         self._said = kind
         return Action(sentence)
-
-    def _dies(self, seen: Seen) -> bool:
-        """Whether the vibration falls, or has fallen since the move and grows no more."""
-        if seen.amplitude < _FALLING * self._levels[0][1]:
-            return True
-        return seen.amplitude < _FALLEN * self._at_move and not seen.growth_rate > 0.0
-
-    def _is_beyond(self, seen: Seen) -> bool:
-        """Whether the vibration is beyond its limit, and stays there."""
-        recent = [level for time, level in self._levels if time > seen.time - _BEYOND]
-        lasting = self._levels[0][0] <= seen.time - _BEYOND
-        return (
-            lasting
-            and min(recent) > self.limits.amplitude_limit
-            and (seen.amplitude > _FALLING * recent[0])
-        )
 
 
 def _same(one: Cut, other: Cut) -> bool:
@@ -350,9 +394,8 @@ def _figures(seen: Seen) -> str:
         (seen.growth_rate, f'growing at {seen.growth_rate:.1f} 1/s'),
         (seen.amplitude, f'amplitude {1e6 * seen.amplitude:.3g} um'),
     ]
-    return 'Chatter ' + (
-        ', '.join(text for value, text in known if math.isfinite(value)) or 'flagged'
-    )
+    words = [text for value, text in known if math.isfinite(value)]
+    return f'Chatter {", ".join(words) or "flagged"}'
 
 
 def _changes(changes: Mapping[str, float], cut: Cut) -> str:
@@ -362,4 +405,5 @@ def _changes(changes: Mapping[str, float], cut: Cut) -> str:
 def _expected(move: Move) -> str:
     margin = '' if math.isnan(move.margin) else f', margin {100.0 * move.margin:.0f} %'
     kept = f'{100.0 * move.kept:.0f} % of the removal rate'
-    return f'predicted: growth {move.growth_rate:.1f} 1/s{margin}, {kept}'
+    sure = f'on {100.0 * move.share:.0f} % of the machines that this may be'
+    return f'predicted: growth {move.growth_rate:.1f} 1/s{margin}, {kept}; stable {sure}'

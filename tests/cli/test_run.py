@@ -102,10 +102,11 @@ def test_the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it(
     assert Path(figures['picture']).stat().st_size > 20_000
 
 
-def test_a_supervisor_cures_it_without_anybody(
-    tmp_path: Path, environment: dict[str, str]
+@pytest.mark.parametrize('name', ['supervised', 'asked'])
+def test_a_supervisor_cures_it_by_itself_or_as_it_is_accepted(
+    name: str, tmp_path: Path, environment: dict[str, str]
 ) -> None:
-    figures = play(at_pace('supervised', tmp_path), tmp_path / 'run', environment)
+    figures = play(at_pace(name, tmp_path), tmp_path / 'run', environment)
     assert 'supervisor: Chatter at' in figures['said']
     assert 'supervisor: The chatter has ended' in figures['said']
     end = figures['occurrences'][-1]
@@ -113,6 +114,7 @@ def test_a_supervisor_cures_it_without_anybody(
     run = read_run(tmp_path / 'run')
     sentences = [each.message.data for each in run.messages('/chatter_supervisor/action')]
     assert any('I set' in sentence for sentence in sentences)
+    assert any('as was accepted' in sentence for sentence in sentences) is (name == 'asked')
 
 
 def test_without_clearance_nothing_is_flagged(tmp_path: Path, environment: dict[str, str]) -> None:

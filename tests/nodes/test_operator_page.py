@@ -5,8 +5,6 @@ from __future__ import annotations
 import http.client
 import http.server
 import json
-import re
-import signal
 import struct
 import sys
 import threading
@@ -20,39 +18,12 @@ from typing import Any
 import numpy as np
 import pytest
 from support.browser import Browser, chromium
-from support.node_processes import NodeProcesses
+from support.page_cell import LAMP, PATIENCE, Page, operate
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 if chromium() is None:
     pytest.skip('no Chromium is here', allow_module_level=True)
-
-PATIENCE = 120.0
-LAMP = 'document.querySelector("#lamp-word").textContent'
-
-
-class Page:
-    """Nodes of one cell with a page, and a browser that has it open."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.nodes = NodeProcesses(folder)
-        self.started: dict[str, Any] = {}
-
-    def start(self, node: str, *parameters: str) -> None:
-        self.started[node] = self.nodes.start(node, *parameters)
-
-    def kill(self, node: str) -> None:
-        self.started[node].send_signal(signal.SIGKILL)
-        self.started[node].wait()
-
-    def url(self) -> str:
-        """Where the page is, once it says so."""
-        until = time.monotonic() + PATIENCE
-        while not (found := re.findall(r'The page is at (\S+)', self.nodes.said())):
-            assert time.monotonic() < until, self.nodes.said()
-            time.sleep(0.1)
-        return str(found[-1])
 
 
 @pytest.fixture(scope='module')
@@ -75,12 +46,6 @@ def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
     browser.until('document.querySelector("#p-depth_of_cut")', 'the controls', PATIENCE)
     yield browser
     browser.close()
-
-
-def operate(browser: Browser) -> None:
-    if browser.run('document.querySelector("#operate").getAttribute("aria-pressed")') != 'true':
-        browser.click('#operate')
-        browser.until('server.operating', 'the right to act')
 
 
 def until_closed(socket: Any) -> None:

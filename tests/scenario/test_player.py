@@ -6,6 +6,7 @@ import math
 
 from lathe_chatter.scenario import CLEARED, FLAGGED, RECOMMENDED, Scenario, Step
 from lathe_chatter.scenario.player import ScenarioPlayer
+from lathe_chatter.scenario.scenario import ASKED
 
 DEEPER = Step({'depth_of_cut': 1e-3}, at=2.0, because='a deeper cut')
 CURE = Step({'spindle_speed_rpm': RECOMMENDED}, when=FLAGGED, after=0.5)
@@ -29,6 +30,18 @@ def test_a_step_with_a_time_is_due_once_at_that_time() -> None:
     assert player.due(3.0, math.nan) is None
     assert player.next_time == math.inf
     assert str(DEEPER) == 'depth_of_cut = 0.001  (a deeper cut)'
+
+
+def test_a_step_accepts_what_a_supervisor_has_asked() -> None:
+    accepts = Step({}, when=ASKED, after=0.5, accept=True)
+    player = player_of(accepts)
+    flag(player, 1.0, up=True)
+    assert player.due(3.0, 3500.0) is None
+    player.hear(ASKED, 3.2)
+    assert player.due(3.6, 3500.0) is None
+    assert player.due(3.8, 3500.0) == accepts
+    assert flag(player, 4.0, up=False) == 'flag cleared'
+    assert str(accepts) == 'the offer of the supervisor is accepted'
 
 
 def test_a_step_waits_for_the_flag_and_for_a_speed() -> None:

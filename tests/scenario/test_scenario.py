@@ -23,7 +23,7 @@ def _write(folder: Path, text: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize('name', ['clearance', 'no_clearance', 'supervised'])
+@pytest.mark.parametrize('name', ['clearance', 'no_clearance', 'supervised', 'asked'])
 def test_shipped_scenarios_can_be_played(name: str) -> None:
     scenario = load_scenario(find_scenario(name))
     assert scenario.name == name
@@ -40,7 +40,7 @@ def test_shipped_scenarios_can_be_played(name: str) -> None:
 
 
 def test_shipped_scenarios_are_found_by_name() -> None:
-    assert {'clearance', 'no_clearance', 'supervised'} <= set(shipped_scenarios())
+    assert {'clearance', 'no_clearance', 'supervised', 'asked'} <= set(shipped_scenarios())
 
 
 def test_a_scenario_is_read_as_it_is_written(tmp_path: Path) -> None:
@@ -94,9 +94,14 @@ def test_the_least_that_a_scenario_needs_is_its_duration(tmp_path: Path) -> None
             'duration: 1\nsteps: [{when: now, set: {runout: 0}}]',
             "when is 'now': it must be flagged",
         ),
+        (
+            'duration: 1\nsupervisor: {}\nsteps: [{at: 1, accept: true, set: {runout: 0}}]',
+            'must set at least one parameter, or accept: true',
+        ),
+        ('duration: 1\nsteps: [{when: asked, accept: true}]', 'no supervisor asks'),
         ('duration: 1\nsteps: [{when: null, set: {runout: 0}}]', 'when is None'),
         ('duration: 1\nsteps: [{at: null, set: {runout: 0}}]', 'at is None'),
-        ('duration: 1\nsteps: [{at: 1}]', 'set must name at least one'),
+        ('duration: 1\nsteps: [{at: 1}]', 'must set at least one parameter'),
         (
             'duration: 1\nsteps: [{at: 1, set: {runout: 0}}, {at: x, set: {runout: 0}}]',
             "step 2: at is 'x'",

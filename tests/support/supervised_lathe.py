@@ -12,7 +12,6 @@ from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor
-from lathe_chatter.supervisor.moves import with_tool_at
 
 BLOCK = 100
 """Samples from one look to the next: 10 ms."""
@@ -113,7 +112,7 @@ class SupervisedLathe:
         known = self.known
         return Seen(
             self.time, self.lathe.cut, known.chatter, known.growth_rate, known.frequency,
-            known.amplitude, known.margin, known.cutting_stiffness,
+            known.amplitude, known.margin, known.cutting_stiffness, known.tool_frequency,
         )  # fmt: skip
 
     def accept(self) -> tuple[bool, str]:
@@ -135,8 +134,7 @@ class SupervisedLathe:
         samples = self.lathe.advance(BLOCK)
         self.vibration.append(float(np.std(samples[:, 2])))
         self.known = self.detector.update(samples, self.lathe.columns)
-        machine = with_tool_at(self.told, self.known.tool_frequency)
-        self.supervisor.machine = machine if self.known.mode.knows_machine else None
+        self.supervisor.machine = self.told if self.known.mode.knows_machine else None
         seen = self._disturb(self, self.seen())
         if seen is not None and not self._due:
             self._note(self.supervisor.look(seen), seen)

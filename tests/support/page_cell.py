@@ -1,0 +1,45 @@
+"""The nodes of a cell with its page, for tests with a real browser."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+from support.browser import Browser
+from support.node_processes import NodeProcesses
+
+PATIENCE = 120.0
+LAMP = 'document.querySelector("#lamp-word").textContent'
+
+
+class Page:
+    """Nodes of one cell with a page, and a browser that has it open."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.nodes = NodeProcesses(folder)
+        self.started: dict[str, Any] = {}
+
+    def start(self, node: str, *parameters: str) -> None:
+        self.started[node] = self.nodes.start(node, *parameters)
+
+    def kill(self, node: str) -> None:
+        self.started[node].send_signal(signal.SIGKILL)
+        self.started[node].wait()
+
+    def url(self) -> str:
+        """Where the page is, once it says so."""
+        until = time.monotonic() + PATIENCE
+        while not (found := re.findall(r'The page is at (\S+)', self.nodes.said())):
+            assert time.monotonic() < until, self.nodes.said()
+            time.sleep(0.1)
+        return str(found[-1])
+
+
+def operate(browser: Browser) -> None:
+    if browser.run('document.querySelector("#operate").getAttribute("aria-pressed")') != 'true':
+        browser.click('#operate')
+        browser.until('server.operating', 'the right to act')
