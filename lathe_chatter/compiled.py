@@ -97,9 +97,9 @@ def compiled(  # noqa: PLR0913 -- one keyword for each fact about a function
     """A decorator for a function of plain numbers and arrays.
 
     It may call compiled functions of its own package only, see above. Floating point is strict
-    IEEE: no operation is fused or reordered, so every machine computes the same bits. Like
-    operations on neighbouring numbers are done at once where the processor can (a quarter off
-    the time of a step), which changes no bit either. Division by zero gives infinity, as in
+    IEEE: no operation is reordered, and none fused but where the code says `fma`, so every machine
+    computes the same bits. Like operations on neighbouring numbers are done at once where the
+    processor can, which changes no bit either. Division by zero gives infinity, as in
     NumPy. Nothing is done before the first call: an import makes no folder.
 
     Args:

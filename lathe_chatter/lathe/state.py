@@ -22,7 +22,7 @@ from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity
 
 _STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)
-_FORMAT = 2
+_FORMAT = 3
 """Of a saved state; another one is refused."""
 
 
@@ -36,7 +36,7 @@ class LatheState:
         numbers: Spindle, surface met, and the coordinates of the 2n modes
             (layout.NUMBERS_SIZE + 4n,).
         counts: Samples and regimes (layout.COUNTS_SIZE,).
-        nodes: The surface of the last turn (nodes, surface.NODE_SIZE).
+        nodes: The surface of the last turn (surface.NODE_SIZE, nodes).
         guard: Why the run has ended, or an empty string.
     """
 
@@ -76,7 +76,7 @@ class LatheState:
         counts = np.zeros(layout.COUNTS_SIZE, dtype=np.int64)
         counts[layout.HEAD], counts[layout.CORNER] = 1, 1
         counts[layout.STEPS] = steps_per_sample(setup, cut, speed)
-        state = cls(setup, cut, numbers, counts, np.empty((0, surface.NODE_SIZE)))
+        state = cls(setup, cut, numbers, counts, np.empty((surface.NODE_SIZE, 0)))
         settings = state.constants.settings
         motion = _modal(start, state.constants)
         counts[layout.REGIME] = layout.IN_CUT + 2 * state._touch(_bearing(state.constants, motion))
@@ -142,8 +142,8 @@ class LatheState:
     def copy(self) -> LatheState:
         """The same state with a memory of its own, no larger than it must be."""
         counts, pointer = self.counts.copy(), int(self.counts[layout.POINTER])
-        nodes = self.nodes[pointer : int(counts[layout.HEAD]) + 1].copy()
-        counts[layout.POINTER], counts[layout.HEAD] = 0, len(nodes) - 1
+        nodes = self.nodes[:, pointer : int(counts[layout.HEAD]) + 1].copy()
+        counts[layout.POINTER], counts[layout.HEAD] = 0, nodes.shape[1] - 1
         return LatheState(self.setup, self.cut, self.numbers.copy(), counts, nodes, self.guard)
 
     def __eq__(self, other: object) -> bool:
@@ -211,7 +211,7 @@ class LatheState:
         fits = (
             self.numbers.shape == (layout.NUMBERS_SIZE + 4 * modes,)
             and self.counts.shape == (layout.COUNTS_SIZE,)
-            and self.nodes.shape == (int(self.counts[layout.HEAD]) + 1, surface.NODE_SIZE)
+            and self.nodes.shape == (surface.NODE_SIZE, int(self.counts[layout.HEAD]) + 1)
             and [array.dtype.str[1:] for array in (self.numbers, self.counts, self.nodes)]
             == ['f8', 'i8', 'f8']
             and 0 <= self.counts[layout.POINTER] < self.counts[layout.HEAD]
@@ -280,18 +280,19 @@ class LatheState:
         # What the tool has met is forgotten here too: places that begin anew with each change
         # would else never become so large that it is.
         pointer = int(counts[layout.POINTER])
-        used = self.nodes[pointer : int(counts[layout.HEAD]) + 1]
-        self.nodes[: len(used)] = surface.recounted(used, place, ratio, ahead, feeds)
-        counts[layout.POINTER], counts[layout.HEAD] = 0, len(used) - 1
-        met: Array = np.zeros((1, surface.NODE_SIZE))
-        met[0, surface.PLACE] = place - old[layout.TURN]
-        met[0, surface.HEIGHT] = numbers[layout.HEIGHT]
-        met[0, surface.SLOPE_AFTER] = numbers[layout.SLOPE]
-        met[0, surface.CURVATURE_AFTER] = numbers[layout.CURVATURE]
+        used = self.nodes[:, pointer : int(counts[layout.HEAD]) + 1]
+        last = used.shape[1] - 1
+        self.nodes[:, : last + 1] = surface.recounted(used, place, ratio, ahead, feeds)
+        counts[layout.POINTER], counts[layout.HEAD] = 0, last
+        met: Array = np.zeros((surface.NODE_SIZE, 1))
+        met[surface.PLACE, 0] = place - old[layout.TURN]
+        met[surface.HEIGHT, 0] = numbers[layout.HEIGHT]
+        met[surface.SLOPE_AFTER, 0] = numbers[layout.SLOPE]
+        met[surface.CURVATURE_AFTER, 0] = numbers[layout.CURVATURE]
         met = surface.recounted(met, place, ratio, ahead, feeds)
-        numbers[layout.HEIGHT] = met[0, surface.HEIGHT]
-        numbers[layout.SLOPE] = met[0, surface.SLOPE_AFTER]
-        numbers[layout.CURVATURE] = met[0, surface.CURVATURE_AFTER]
+        numbers[layout.HEIGHT] = met[surface.HEIGHT, 0]
+        numbers[layout.SLOPE] = met[surface.SLOPE_AFTER, 0]
+        numbers[layout.CURVATURE] = met[surface.CURVATURE_AFTER, 0]
         turned = numbers[layout.ORIGIN_LOW] + place / old[layout.TURN]
         total = numbers[layout.ORIGIN] + turned
         numbers[layout.ORIGIN_LOW] = turned - (total - numbers[layout.ORIGIN])

@@ -203,7 +203,7 @@ class VirtualLathe:
                 self._found.append(self._event_space[:found].copy())
             if status == layout.SURFACE_FULL:
                 nodes = self._state.nodes
-                self._state.nodes = surface.with_room(nodes, 2 * len(nodes))
+                self._state.nodes = surface.with_room(nodes, 2 * nodes.shape[1])
             elif status == layout.EVENTS_FULL:
                 self._event_space = np.empty((2 * len(self._event_space), 3))
         if status == layout.GUARD:
@@ -255,7 +255,7 @@ class VirtualLathe:
     def _begin(self, state: LatheState) -> None:
         """Take over a state."""
         state.numbers = surface.aligned_copy(state.numbers)
-        state.nodes = surface.with_room(state.nodes, len(state.nodes) + _ROOM)
+        state.nodes = surface.with_room(state.nodes, state.nodes.shape[1] + _ROOM)
         self._state = state
         self._event_space = np.empty((64, 3))
         self._found = []
@@ -264,7 +264,7 @@ class VirtualLathe:
     def _prepare(self) -> None:
         """Turn machine and cut into the constants of the inner loop."""
         modes = len(self._state.numbers) - layout.NUMBERS_SIZE >> 2
-        self._flat, self._shape = self._state.constants.flat, (0.0,) * modes
+        self._flat = self._state.constants.flat
         self._columns = len(self.columns)
         self._room = stepper.room_for(modes)
 
@@ -273,7 +273,7 @@ class VirtualLathe:
         state = self._state
         done, found, status = stepper.advance(
             state.numbers, state.counts, state.nodes, self._flat, out, self._event_space,
-            self._room, self._shape,
+            self._room,
         )  # fmt: skip
         return int(done), int(found), int(status)
 

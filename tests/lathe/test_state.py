@@ -65,9 +65,9 @@ def test_a_state_of_another_format_is_refused(tmp_path: Path) -> None:
     _some_state().save(file)
     with np.load(file) as saved:
         parts = dict(saved)
-    parts['words'] = np.array(str(parts['words']).replace('"format": 2', '"format": 99'))
+    parts['words'] = np.array(str(parts['words']).replace('"format": 3', '"format": 99'))
     np.savez(file, **parts)
-    with pytest.raises(StateError, match='format 99, and this version continues from format 2'):
+    with pytest.raises(StateError, match='format 99, and this version continues from format 3'):
         LatheState.load(file)
 
 

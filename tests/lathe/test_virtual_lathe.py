@@ -216,7 +216,7 @@ def test_memory_does_not_grow_with_the_run(cut: Cut, rate: float) -> None:
     sizes = []
     for _ in range(40):
         lathe.advance(round(0.5 * rate))
-        sizes.append(len(lathe.snapshot().nodes))
+        sizes.append(lathe.snapshot().nodes.shape[1])
     assert max(sizes[20:]) <= 1.5 * max(sizes[2:8])
 
 
@@ -248,7 +248,7 @@ def test_memory_does_not_grow_with_changes_of_speed() -> None:
         other = VirtualLathe.continued(other.snapshot())  # which forgets everything that it can
         other.retune(cut)
         assert lathe.advance(150).tobytes() == other.advance(150).tobytes()
-    assert len(lathe.snapshot().nodes) <= len(lathe._state.nodes) < 2500
+    assert lathe.snapshot().nodes.shape[1] <= lathe._state.nodes.shape[1] < 2500
 
 
 @pytest.mark.parametrize('change', [_jumping, _flipping, _anything])
@@ -373,16 +373,16 @@ def test_two_corners_of_the_surface_at_one_place_are_met_one_after_the_other() -
     corners = [
         k
         for k in range(pointer + 2, head - 1)
-        if state.nodes[k, surface.ORDER] <= surface.LAST_ORDER
+        if state.nodes[surface.ORDER, k] <= surface.LAST_ORDER
     ]
     assert corners
     doubled = state.copy()
     place = corners[0]
-    nodes = np.insert(state.nodes, place + 1, state.nodes[place], axis=0)
-    nodes[place, surface.SLOPE_AFTER] = nodes[place, surface.SLOPE_BEFORE]
-    nodes[place, surface.CURVATURE_AFTER] = nodes[place, surface.CURVATURE_BEFORE]
-    nodes[place + 1, surface.SLOPE_BEFORE] = nodes[place, surface.SLOPE_AFTER]
-    nodes[place + 1, surface.CURVATURE_BEFORE] = nodes[place, surface.CURVATURE_AFTER]
+    nodes = np.insert(state.nodes, place + 1, state.nodes[:, place], axis=1)
+    nodes[surface.SLOPE_AFTER, place] = nodes[surface.SLOPE_BEFORE, place]
+    nodes[surface.CURVATURE_AFTER, place] = nodes[surface.CURVATURE_BEFORE, place]
+    nodes[surface.SLOPE_BEFORE, place + 1] = nodes[surface.SLOPE_AFTER, place]
+    nodes[surface.CURVATURE_BEFORE, place + 1] = nodes[surface.CURVATURE_AFTER, place]
     doubled.nodes = nodes
     doubled.counts[layout.HEAD] += 1
     went_on = VirtualLathe.continued(doubled).advance(400)

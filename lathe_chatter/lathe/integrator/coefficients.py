@@ -307,7 +307,7 @@ def _whole_step(generator: Array, starts: Array, held: Array) -> tuple[Array, Ar
     """
     state, forced = starts.copy(), np.zeros(held.shape[:2])
     term, pushed = starts, np.zeros(held.shape[:2])
-    for k in range(TERMS - 1):
+    for k in range(TERMS):
         pushed = product(generator, pushed) + (held[:, :, k] if k < held.shape[2] else 0.0)
         term, pushed = product(generator, term) / (k + 1), pushed / (k + 1)
         state, forced = state + term, forced + pushed
@@ -347,7 +347,7 @@ def _direct(shapes: Shapes, settings: Array, regime: int, basis: Basis) -> Array
     seen = np.array([shapes.relative * square, shapes.tool, shapes.workpiece])
     result = np.zeros(layout.DIRECT)
     result[: layout.COUPLED] = product(seen, acting).ravel()
-    result[layout.COUPLED] = 0.0 if basis.in_pairs else 1.0
+    result[[layout.COUPLED, layout.RATE]] = float(not basis.in_pairs), basis.rate
     return result
 
 

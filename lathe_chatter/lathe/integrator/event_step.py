@@ -23,16 +23,9 @@ from lathe_chatter.lathe.integrator.event_search import (
     solve_series,
 )
 from lathe_chatter.lathe.integrator.events import NEVER
+from lathe_chatter.lathe.integrator.lanes import fma
 from lathe_chatter.lathe.integrator.piece import by_time, plan_piece
-from lathe_chatter.lathe.integrator.propagation import (
-    Shape,
-    add_held_forces,
-    add_unbalance,
-    coordinates_at,
-    read_outputs,
-    whole_step,
-)
-from lathe_chatter.lathe.integrator.registers import loaded
+from lathe_chatter.lathe.integrator.propagation import coordinates_at, read_outputs
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.state_layout import (
     BEARING_V,
@@ -60,13 +53,14 @@ def _leave_surface(
     slope, curvature = piece[at.SLOPE_1], piece[at.CURVATURE_1]
     pitch = piece[at.SPEED_1]
     if counts[layout.REGIME] & layout.IN_CUT != 0:
-        height = seen[TOOL_X] - seen[WORKPIECE_X] + piece[at.AHEAD_1]
-        slope, curvature = by_place(
-            seen[TOOL_V] - seen[WORKPIECE_V], bend, settings[layout.LEAD], piece[at.SPEED_1],
-            piece[at.ACCELERATION_1],
-        )  # fmt: skip
+        height = seen[0, TOOL_X] - seen[0, WORKPIECE_X] + piece[at.AHEAD_1]
+        slope, curvature = seen[0, TOOL_V] - seen[0, WORKPIECE_V], bend
+        if pitch != 1.0 or piece[at.ACCELERATION_1] != 0.0:
+            slope, curvature = by_place(
+                slope, bend, settings[layout.LEAD], pitch, piece[at.ACCELERATION_1]
+            )
     else:
-        pitch = min(pitch, nodes[counts[layout.POINTER] + 1, surface.PITCH])
+        pitch = min(pitch, nodes[surface.PITCH, counts[layout.POINTER] + 1])
     counts[layout.HEAD] += 1
     surface.write_node(
         nodes, counts[layout.HEAD], piece[at.PLACE_1], height, slope, curvature, pitch
@@ -83,19 +77,19 @@ def _move_on(
     numbers[layout.HEIGHT] = piece[at.HEIGHT_1]
     numbers[layout.SLOPE], numbers[layout.CURVATURE] = piece[at.SLOPE_1], piece[at.CURVATURE_1]
     if at_node:
-        numbers[layout.CURVATURE] = nodes[node, surface.CURVATURE_AFTER]
-    if at_node and nodes[node, surface.ORDER] <= surface.LAST_ORDER:
-        numbers[layout.SLOPE] = nodes[node, surface.SLOPE_AFTER]
+        numbers[layout.CURVATURE] = nodes[surface.CURVATURE_AFTER, node]
+    if at_node and nodes[surface.ORDER, node] <= surface.LAST_ORDER:
+        numbers[layout.SLOPE] = nodes[surface.SLOPE_AFTER, node]
         # A corner comes back two orders smoother, through a force; or as it was, uncut.
-        order = int(nodes[node, surface.ORDER])
+        order = int(nodes[surface.ORDER, node])
         if counts[layout.REGIME] & layout.IN_CUT == 0:
             counts[layout.SURFACE_CORNER] = order
         elif order + 2 <= surface.LAST_ORDER:
             counts[layout.CORNER] = order + 2
-    numbers[layout.RELATIVE] = seen[TOOL_X] - seen[WORKPIECE_X]
-    numbers[layout.RELATIVE_RATE] = seen[TOOL_V] - seen[WORKPIECE_V]
-    numbers[layout.AT_BEARING] = seen[BEARING_X]
-    numbers[layout.AT_BEARING_RATE] = seen[BEARING_V]
+    numbers[layout.RELATIVE] = seen[0, TOOL_X] - seen[0, WORKPIECE_X]
+    numbers[layout.RELATIVE_RATE] = seen[0, TOOL_V] - seen[0, WORKPIECE_V]
+    numbers[layout.AT_BEARING] = seen[0, BEARING_X]
+    numbers[layout.AT_BEARING_RATE] = seen[0, BEARING_V]
     numbers[layout.PLACE], numbers[layout.AHEAD] = piece[at.PLACE_1], piece[at.AHEAD_1]
     numbers[layout.SPEED] += slope * piece[at.DURATION] * settings[layout.TARGET_SPEED]
     if ramp_ends:
@@ -111,7 +105,7 @@ def _move_on(
 @compiled(inline=True, borrows=True)
 def take_step(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
-    on_tool: float, between: float, events: Array, found: int, scratch: Scratch, shape: Shape,
+    on_tool: float, between: float, events: Array, found: int, scratch: Scratch,
 ) -> tuple[int, int]:  # fmt: skip
     """Take a whole step, or go on with one that was interrupted, whatever happens in it.
 
@@ -127,13 +121,12 @@ def take_step(
         events: Written: samples before the event, s since that sample, kind.
         found: Events written so far.
         scratch: Room; `scratch.seen` is left with what the end of the step means.
-        shape: One entry a mode.
 
     Returns:
         Events written so far, and FINISHED; or, with the rest of the step noted, SURFACE_FULL
         or EVENTS_FULL.
     """
-    n2 = 2 * len(shape)
+    n2 = z.shape[0]
     piece, end, seen, forces = scratch.piece, scratch.end, scratch.seen, scratch.forces
     merge, lead, target = surface.MERGE, settings[layout.LEAD], settings[layout.TARGET_SPEED]
     variation, frequency = settings[layout.VARIATION], settings[layout.VARIATION_FREQUENCY]
@@ -142,12 +135,13 @@ def take_step(
     if numbers[layout.LEFT] == 0.0:
         numbers[layout.LEFT], counts[layout.FLIPS] = 1.0, 0
     while numbers[layout.LEFT] > 0.0:
-        if counts[layout.HEAD] + 2 >= nodes.shape[0]:
+        if counts[layout.HEAD] + 2 >= nodes.shape[1]:
             return found, layout.SURFACE_FULL
         if found == events.shape[0]:
             return found, layout.EVENTS_FULL
-        base, slope = numbers[layout.SPEED] / target, 0.0
+        base, slope = 1.0, 0.0
         if numbers[layout.SPEED] != target:
+            base = numbers[layout.SPEED] / target
             slope = math.copysign(settings[layout.ACCELERATION], 1.0 - base)
         unsteady = slope != 0.0 or variation != 0.0
         speed, acceleration = base, 0.0
@@ -156,13 +150,15 @@ def take_step(
                 base, slope, variation, numbers[layout.PHASE], frequency
             )
         regime, left = counts[layout.REGIME], numbers[layout.LEFT]
-        rules, direct = machine.rules[regime], machine.direct[regime]
+        direct = machine.direct[regime]
         in_cut = regime & layout.IN_CUT != 0
         varies = unsteady and damping != 0.0 and in_cut
         piece[at.MET_0] = numbers[layout.HEIGHT] - settings[layout.FEED] - numbers[layout.AHEAD]
-        piece[at.RATE_0], piece[at.BEND_0] = by_time(
-            numbers[layout.SLOPE], numbers[layout.CURVATURE], lead, speed, acceleration
-        )
+        piece[at.RATE_0], piece[at.BEND_0] = numbers[layout.SLOPE], numbers[layout.CURVATURE]
+        if speed != 1.0 or acceleration != 0.0:
+            piece[at.RATE_0], piece[at.BEND_0] = by_time(
+                numbers[layout.SLOPE], numbers[layout.CURVATURE], lead, speed, acceleration
+            )
         f0 = g0 = h0 = f1 = g1 = h1 = 0.0
         if unbalanced:
             f0, g0, h0 = unbalance_force(
@@ -177,65 +173,47 @@ def take_step(
                 z, machine.outputs[regime], direct, piece[at.MET_0], on_tool, between + more, f0
             )
             finish_corner(numbers, counts, nodes, settings, bend, speed, acceleration)
-        node, at_node, ramp_ends = plan_piece(numbers, counts, nodes, settings, slope, left, piece)
-        place, event, extra = NEVER, NOTHING, 0.0
-        for attempt in range(2):
-            duration = piece[at.DURATION]
-            if unbalanced:
-                phase = numbers[layout.PHASE] + frequency * duration
-                f1, g1, h1 = unbalance_force(
-                    settings, angle_at(numbers, settings, piece[at.PLACE_1]),
-                    piece[at.SPEED_1], piece[at.ACCELERATION_1],
-                    speed_curvature(base + slope * duration, slope, variation, phase, frequency),
-                )  # fmt: skip
-            if varies:
-                middle, _ = speed_and_slope(
-                    base + 0.5 * slope * duration, slope, variation,
-                    numbers[layout.PHASE] + 0.5 * frequency * duration, frequency,
-                )  # fmt: skip
-                first, half = damping * (1.0 / speed - 1.0), damping * (1.0 / middle - 1.0)
-                extra = damping * (1.0 / piece[at.SPEED_1] - 1.0)
-                forces[3], forces[4], forces[5] = (
-                    first,
-                    4.0 * half - 3.0 * first - extra,
-                    2.0 * first - 4.0 * half + 2.0 * extra,
-                )
-            solved = attempt == 1 or varies or duration != 1.0
-            if solved:
-                forces[0], forces[1] = on_tool, between
-                forces[2] = 2.0 if varies else 1.0 if unbalanced else 0.0
-                solve_series(z, regime, machine, scratch, (f0, g0, h0, f1, g1, h1), shape)
-            else:
-                there = whole_step(
-                    loaded(z, scratch.room[0], shape), rules, machine.matrices[regime, 1],
-                    direct[layout.COUPLED] != 0.0, in_cut,
-                    piece[at.MET_0], piece[at.RATE_0], piece[at.BEND_0],
-                    piece[at.MET_1], piece[at.RATE_1], piece[at.BEND_1],
-                    loaded(z, scratch.room[1], shape), shape,
-                )  # fmt: skip
-                if noisy:
-                    there = add_held_forces(rules, on_tool, between, there, shape)
-                if unbalanced:
-                    there = add_unbalance(rules, f0, g0, h0, f1, g1, h1, there, shape)
-                for i in range(n2):
-                    end[i] = there[i]
-            read_outputs(machine.outputs[regime], end, seen, shape)
-            if counts[layout.FLIPS] >= _MOST_FLIPS:
-                break
-            place, event, again = first_event(
-                numbers, regime, machine, settings, scratch, solved, shape
+        node, at_node, ramp_ends = plan_piece(
+            numbers, counts, nodes, settings, base, slope, left, piece
+        )
+        place, event, extra, duration = NEVER, NOTHING, 0.0, piece[at.DURATION]
+        if unbalanced:
+            f1, g1, h1 = unbalance_force(
+                settings, angle_at(numbers, settings, piece[at.PLACE_1]), piece[at.SPEED_1],
+                piece[at.ACCELERATION_1],
+                speed_curvature(
+                    base + slope * duration, slope, variation,
+                    numbers[layout.PHASE] + frequency * duration, frequency,
+                ),
+            )  # fmt: skip
+        if varies:
+            middle, _ = speed_and_slope(
+                base + 0.5 * slope * duration, slope, variation,
+                numbers[layout.PHASE] + 0.5 * frequency * duration, frequency,
+            )  # fmt: skip
+            first, half = damping * (1.0 / speed - 1.0), damping * (1.0 / middle - 1.0)
+            extra = damping * (1.0 / piece[at.SPEED_1] - 1.0)
+            forces[3], forces[4], forces[5] = (
+                first,
+                4.0 * half - 3.0 * first - extra,
+                2.0 * first - 4.0 * half + 2.0 * extra,
             )
-            if not again:
-                break
+        forces[0], forces[1] = on_tool, between
+        forces[2] = 2.0 if varies else 1.0 if unbalanced else 0.0
+        outputs = machine.outputs[regime]
+        wide = solve_series(z, regime, machine, scratch, f0, g0, h0, f1, g1, h1)
+        read_outputs(outputs, end, seen)
+        if counts[layout.FLIPS] < _MOST_FLIPS:
+            place, event = first_event(numbers, regime, outputs, settings, scratch, wide)
         kind, after = layout.NO_EVENT, regime
         if event != NOTHING:
             until = place * piece[at.DURATION]
             if merge < until < piece[at.DURATION] - merge:
                 # Inside: the piece ends here, on the series in which the event was found.
-                coordinates_at(scratch.series, place, end, shape)
-                read_outputs(machine.outputs[regime], end, seen, shape)
+                coordinates_at(z, scratch.series, wide, place, end)
+                read_outputs(outputs, end, seen)
                 node, at_node, ramp_ends = plan_piece(
-                    numbers, counts, nodes, settings, slope, until, piece
+                    numbers, counts, nodes, settings, base, slope, until, piece
                 )
                 if varies:
                     extra = damping * (1.0 / piece[at.SPEED_1] - 1.0)
@@ -255,10 +233,8 @@ def take_step(
             found += 1
             counts[layout.FLIPS] += 1
         if piece[at.DURATION] > 0.0:
-            more = extra * (seen[TOOL_V] - seen[WORKPIECE_V])
-            bend = bend_of(
-                end, machine.outputs[regime], direct, piece[at.MET_1], on_tool, between + more, f1
-            )
+            more = extra * (seen[0, TOOL_V] - seen[0, WORKPIECE_V])
+            bend = bend_of(end, outputs, direct, piece[at.MET_1], on_tool, between + more, f1)
             _leave_surface(counts, nodes, settings, bend, scratch)
             _move_on(numbers, counts, nodes, settings, slope, node, at_node, ramp_ends, scratch)
             left -= piece[at.DURATION]
@@ -272,9 +248,8 @@ def take_step(
         moves = machine.moves[regime, after]
         for i in range(n2):
             end[i] = moves[n2, i]
-        for i in range(n2):
             for j in range(n2):
-                end[i] += moves[i, j] * z[j]
+                end[i] = fma(moves[i, j], z[j], end[i])
         for i in range(n2):
             z[i] = end[i]
         counts[layout.REGIME] = after

@@ -26,12 +26,12 @@ def may_turn_back(
 
 
 @compiled(borrows=True)
-def _lowest(margin: Array) -> tuple[float, float]:
+def _lowest(margin: Array, last: int) -> tuple[float, float]:
     """Where a margin that falls first and then rises is lowest, or some place where it is < 0."""
     low, high, place, value = 0.0, 1.0, 0.5, 0.0
     for _ in range(_ITERATIONS):
         place = 0.5 * (low + high)
-        value, slope = value_and_slope(margin, place)
+        value, slope = value_and_slope(margin, last, place)
         if value < 0.0 or high - low <= _CLOSE:
             break
         if slope < 0.0:
@@ -42,12 +42,12 @@ def _lowest(margin: Array) -> tuple[float, float]:
 
 
 @compiled(borrows=True)
-def _highest(margin: Array) -> float:
+def _highest(margin: Array, last: int) -> float:
     """Where a margin that rises first and then falls is highest."""
     low, high = 0.0, 1.0
     for _ in range(_ITERATIONS):
         place = 0.5 * (low + high)
-        if value_and_slope(margin, place)[1] > 0.0:
+        if value_and_slope(margin, last, place)[1] > 0.0:
             low = place
         else:
             high = place
@@ -72,14 +72,15 @@ def _guess(start: float, slope: float, end: float, slope_end: float) -> float:
 
 
 @compiled(borrows=True)
-def first_crossing(margin: Array, end: float, slope_end: float) -> float:
+def first_crossing(margin: Array, last: int, end: float, slope_end: float) -> float:
     """Where a margin, which should stay positive, first falls below zero.
 
     A piece is a small part of a vibration period (|lambda| dt <= 0.25), so the margin turns
     at most once inside it. At 0 the margin may be zero but for rounding, just after an event.
 
     Args:
-        margin: Coefficients (TERMS,) of its power series on [0, 1].
+        margin: Coefficients of its power series on [0, 1].
+        last: The last of them that counts.
         end: Its value at 1.
         slope_end: Its slope there.
 
@@ -91,14 +92,14 @@ def first_crossing(margin: Array, end: float, slope_end: float) -> float:
     if end < 0.0 < start:
         place = _guess(start, slope, end, slope_end)
     elif end < 0.0 < slope:  # it grows first, and comes back
-        low = _highest(margin)
-        if not value_and_slope(margin, low)[0] > 0.0:
+        low = _highest(margin, last)
+        if not value_and_slope(margin, last, low)[0] > 0.0:
             return 0.0
         place = 0.5 * (low + high)
     elif end < 0.0:
         return 0.0
     elif slope < 0.0 < slope_end:
-        high, value = _lowest(margin)
+        high, value = _lowest(margin, last)
         if value >= 0.0:
             return NEVER
         if start <= 0.0:
@@ -108,9 +109,9 @@ def first_crossing(margin: Array, end: float, slope_end: float) -> float:
         return NEVER
     # Newton's steps shrink as step' = c step^2, so two of them tell the size of the next: the
     # last one need not be taken to know that it is nothing.
-    last = 1.0
+    before = 1.0
     for _ in range(_ITERATIONS):
-        value, falls = value_and_slope(margin, place)
+        value, falls = value_and_slope(margin, last, place)
         if value >= 0.0:
             low = place
         else:
@@ -119,11 +120,11 @@ def first_crossing(margin: Array, end: float, slope_end: float) -> float:
         size = abs(step)
         place -= step
         if not low <= place <= high:  # Newton has left the bracket, or the slope is zero
-            place, last = 0.5 * (low + high), 1.0
+            place, before = 0.5 * (low + high), 1.0
             if high - low <= _CLOSE:
                 break
             continue
-        if size * size * size <= _CLOSE * last * last or size <= 0.1 * _CLOSE:
+        if size * size * size <= _CLOSE * before * before or size <= 0.1 * _CLOSE:
             break
-        last = size
+        before = size
     return place

@@ -39,8 +39,8 @@ def by_time(
 
 @compiled(borrows=True)
 def plan_piece(
-    numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, limit: float,
-    piece: Array,
+    numbers: Array, counts: Integers, nodes: Array, settings: Array, base: float, slope: float,
+    limit: float, piece: Array,
 ) -> tuple[int, bool, bool]:  # fmt: skip
     """Where a piece of at most `limit` steps ends, and what the tool meets there, into `piece`.
 
@@ -49,6 +49,7 @@ def plan_piece(
         counts: The remembered integers.
         nodes: The surface.
         settings: What machine and cut ask for.
+        base: The speed over the target speed, without its variation.
         slope: Of the speed over the target speed, per step, while that ramps.
         limit: Steps.
         piece: Written but for what belongs to its start.
@@ -56,7 +57,7 @@ def plan_piece(
     Returns:
         The node at or before the place met, whether it is just there, whether a ramp ends.
     """
-    base, phase = numbers[layout.SPEED] / settings[layout.TARGET_SPEED], numbers[layout.PHASE]
+    phase = numbers[layout.PHASE]
     variation, frequency = settings[layout.VARIATION], settings[layout.VARIATION_FREQUENCY]
     turn, merge = settings[layout.TURN], surface.MERGE
     steady = slope == 0.0 and variation == 0.0
@@ -70,7 +71,7 @@ def plan_piece(
     if not steady:
         rise = turned(duration, base, slope, variation, phase, frequency)
     node = counts[layout.POINTER]
-    pitch = nodes[node + 1, surface.PITCH]
+    pitch = nodes[surface.PITCH, node + 1]
     if rise > DETAIL * pitch:
         duration, ramp_ends = duration * (0.8 * DETAIL * pitch / rise), False
         rise = base * duration
@@ -78,21 +79,21 @@ def plan_piece(
             rise = turned(duration, base, slope, variation, phase, frequency)
     here = numbers[layout.PLACE]
     place, near, at_node = here + rise - turn, merge * base, False
-    while nodes[node + 1, surface.PLACE] < place - near:
+    while nodes[surface.PLACE, node + 1] < place - near:
         node += 1
-        if nodes[node, surface.ORDER] <= surface.LAST_ORDER:
-            place, ramp_ends, at_node = nodes[node, surface.PLACE], False, True
+        if nodes[surface.ORDER, node] <= surface.LAST_ORDER:
+            place, ramp_ends, at_node = nodes[surface.PLACE, node], False, True
             rise = max(place + turn - here, 0.0)  # two corners may be at one place
-            duration = rise / base
+            duration = rise if base == 1.0 else rise / base
             if not steady:
                 duration = time_to_turn(rise, base, slope, variation, phase, frequency)
             break
-    if not at_node and nodes[node + 1, surface.PLACE] <= place + near:
+    if not at_node and nodes[surface.PLACE, node + 1] <= place + near:
         node, at_node = node + 1, True
     if at_node:
-        piece[HEIGHT_1] = nodes[node, surface.HEIGHT]
-        piece[SLOPE_1] = nodes[node, surface.SLOPE_BEFORE]
-        piece[CURVATURE_1] = nodes[node, surface.CURVATURE_BEFORE]
+        piece[HEIGHT_1] = nodes[surface.HEIGHT, node]
+        piece[SLOPE_1] = nodes[surface.SLOPE_BEFORE, node]
+        piece[CURVATURE_1] = nodes[surface.CURVATURE_BEFORE, node]
     else:
         piece[HEIGHT_1], piece[SLOPE_1], piece[CURVATURE_1] = surface.surface_at(
             nodes, node, place
@@ -110,7 +111,9 @@ def plan_piece(
     lead = settings[layout.LEAD]
     piece[AHEAD_1] = numbers[layout.AHEAD] + lead * (duration - rise)
     piece[MET_1] = piece[HEIGHT_1] - settings[layout.FEED] - piece[AHEAD_1]
-    piece[RATE_1], piece[BEND_1] = by_time(
-        piece[SLOPE_1], piece[CURVATURE_1], lead, piece[SPEED_1], piece[ACCELERATION_1]
-    )
+    piece[RATE_1], piece[BEND_1] = piece[SLOPE_1], piece[CURVATURE_1]
+    if not steady or base != 1.0:
+        piece[RATE_1], piece[BEND_1] = by_time(
+            piece[SLOPE_1], piece[CURVATURE_1], lead, piece[SPEED_1], piece[ACCELERATION_1]
+        )
     return node, at_node, ramp_ends

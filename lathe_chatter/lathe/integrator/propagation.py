@@ -17,212 +17,191 @@ Whole steps repeat with the same length, so for them the series is summed once p
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator.registers import with_entry
+from lathe_chatter.lathe.integrator.lanes import (
+    LANES,
+    after,
+    fma,
+    lane,
+    lanes_at,
+    powers,
+    put,
+    spread,
+    total,
+    turned_on,
+)
 from lathe_chatter.lathe.integrator.state_layout import (
     BY_CUTTING_FORCE,
     BY_SURFACE,
     BY_TOOL_FORCE,
     BY_UNBALANCE,
-    OUTPUTS,
+    COUPLED,
     OWN,
     PARTNER,
+    RATE,
     RELATIVE_RATE_ROW,
-    STEP_CUTTING_FORCE,
-    STEP_OWN,
-    STEP_PARTNER,
-    STEP_SURFACE,
-    STEP_TOOL_FORCE,
-    STEP_UNBALANCE,
 )
 
-TERMS = 13
-"""Coefficients of a series: 0.25^13/13! is 2e-18."""
+TERMS = 2 * LANES
+"""Terms of a series after the first: 0.25^17/17! is 2e-25."""
 RATE_STEP = 0.25
 """Largest |lambda| dt of a step, see `TERMS`; the quintic errs by 2.2e-5 of its sixth power."""
-FACTORIAL = np.cumprod(np.append(1.0, np.arange(1.0, TERMS + 1.0)))
-INVERSE_FACTORIAL = 1.0 / FACTORIAL
-
-Shape = tuple[float, ...]
-"""One entry a mode: its length is a constant to the compiler, so that short loops unroll."""
+_SHORT = 0.06
+"""Up to this |lambda| dt half of the terms do: 0.06^9/9! is 3e-17."""
+WEIGHTS = np.array([[1.0 / math.factorial(k + 1) for k in range(TERMS)]])
+"""Of the terms at the end of a piece."""
 
 
 @compiled(inline=True, borrows=True)
-def quintic(u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array) -> None:
-    """Coefficients (6,) of the quintic on [0, 1] with these values, slopes and curvatures."""
+def quintic(
+    u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array, row: int
+) -> None:
+    """The quintic on [0, 1] with these values, slopes and curvatures: six derivatives at 0."""
     rise = u1 - u0 - d0 - 0.5 * e0
     steep = d1 - d0 - e0
     bend = e1 - e0
-    out[0] = u0
-    out[1] = d0
-    out[2] = 0.5 * e0
-    out[3] = 10.0 * rise - 4.0 * steep + 0.5 * bend
-    out[4] = -15.0 * rise + 7.0 * steep - bend
-    out[5] = 6.0 * rise - 3.0 * steep + 0.5 * bend
+    out[row, 0], out[row, 1], out[row, 2] = u0, d0, e0
+    out[row, 3] = 6.0 * (10.0 * rise - 4.0 * steep + 0.5 * bend)
+    out[row, 4] = 24.0 * (-15.0 * rise + 7.0 * steep - bend)
+    out[row, 5] = 120.0 * (6.0 * rise - 3.0 * steep + 0.5 * bend)
 
 
 @compiled(inline=True, borrows=True)
 def solve_piece(
-    z: Array, duration: float, rules: Array, generator: Array, coupled: bool, forces: Array,
-    surface: Array, unbalance: Array, series: Array, work: Array, end: Array, shape: Shape,
-) -> None:  # fmt: skip
-    """Fill the power series of all coordinates on [0, 1] times `duration`, and sum them at 1.
+    z: Array, duration: float, rules: Array, generator: Array, direct: Array, forces: Array,
+    given: Array, series: Array, work: Array, end: Array,
+) -> bool:  # fmt: skip
+    """The power series of all coordinates on [0, 1] times `duration`, and its sum at 1.
 
-    The recurrence runs on k! times the terms: its chain is then a product and two sums.
+    The recurrence runs on k! times the terms, the derivatives: its chain is then short.
 
     Args:
         z: The coordinates at the start (2n,).
         duration: Length of the piece, steps.
         rules: The coefficients of the regime (ROWS, 2n).
         generator: The same where they are coupled (2n, 2n).
-        coupled: Whether they are.
+        direct: Whether they are, and how fast the regime is (DIRECT,).
         forces: Of what acts beside the surface (6,): on the tool and between tool and workpiece,
             N; 1 if there is an unbalance, 2 if the damping varies too, and the three
             coefficients on [0, 1] of what it has more than at the target speed, N per m/step.
-        surface: Coefficients (6,) of the surface met, on [0, 1].
-        unbalance: The same of the force of an unbalance, N.
-        series: Written (TERMS, 2n).
-        work: Room (5, 2n + TERMS).
+        given: Derivatives at the start of the surface met, m, and of the force of an unbalance,
+            N, for a time of `duration` (2, TERMS); none from the sixth on.
+        series: Written: the derivatives of the coordinates, from the first on (2n, TERMS).
+        work: Room (3, 2n + TERMS).
         end: Written: the coordinates at the end (2n,).
-        shape: One entry a mode.
+
+    Returns:
+        Whether all of the terms count; else the first `LANES` do.
     """
-    n = len(shape)
-    unbalanced, varies = forces[2] != 0.0, forces[2] == 2.0
+    n = z.shape[0] // 2
+    coupled = direct[COUPLED] != 0.0 or forces[2] == 2.0
+    wide = coupled or duration * direct[RATE] > _SHORT
+    met, turning = duration * lanes_at(given, 0, 0), duration * lanes_at(given, 1, 0)
+    on_tool, between = duration * forces[0], duration * forces[1]
     for i in range(2 * n):
-        work[0, i] = duration * rules[OWN, i]
-        work[1, i] = duration * rules[PARTNER, i]
-        work[2, i] = duration * rules[BY_SURFACE, i]
-        work[3, i] = z[i]
-        series[0, i] = z[i]
-        end[i] = z[i]
-    for k in range(TERMS - 1):
-        met = surface[k] * FACTORIAL[k] if k < 6 else 0.0
-        if coupled:
-            for i in range(2 * n):
-                total = work[2, i] * met
-                for j in range(2 * n):
-                    total += duration * generator[i, j] * work[3, j]
-                work[4, i] = total
-        else:
-            for i in range(n):
-                x, y = work[3, i], work[3, n + i]
-                work[4, i] = (work[0, i] * x + work[2, i] * met) + work[1, i] * y
-                work[4, n + i] = (work[0, n + i] * y + work[2, n + i] * met) + work[1, n + i] * x
-        if k == 0 and (forces[0] != 0.0 or forces[1] != 0.0):
-            on_tool, between = duration * forces[0], duration * forces[1]
-            for i in range(2 * n):
-                work[4, i] += rules[BY_TOOL_FORCE, i] * on_tool
-                work[4, i] += rules[BY_CUTTING_FORCE, i] * between
-        if unbalanced:
-            if k < 6:
-                turning = duration * unbalance[k] * FACTORIAL[k]
-                for i in range(2 * n):
-                    work[4, i] += rules[BY_UNBALANCE, i] * turning
-            if varies:
-                rate = 0.0
-                for i in range(2 * n):
-                    rate += rules[RELATIVE_RATE_ROW, i] * work[3, i]
-                work[4, 2 * n + k] = rate
-                damped = forces[3] * rate
-                if k >= 1:
-                    damped += forces[4] * k * work[4, 2 * n + k - 1]
-                if k >= 2:
-                    damped += forces[5] * k * (k - 1.0) * work[4, 2 * n + k - 2]
-                for i in range(2 * n):
-                    work[4, i] += rules[BY_CUTTING_FORCE, i] * (duration * damped)
-        for i in range(2 * n):
-            work[3, i] = work[4, i]
-            series[k + 1, i] = work[4, i] * INVERSE_FACTORIAL[k + 1]
-            end[i] += series[k + 1, i]
-
-
-@compiled(borrows=True, apart=True)
-def coordinates_at(series: Array, place: float, z: Array, shape: Shape) -> None:
-    """Write the coordinates (2n,) at `place` of a solved piece."""
-    for i in range(2 * len(shape)):
-        z[i] = series[TERMS - 1, i]
-    for k in range(TERMS - 2, -1, -1):
-        for i in range(2 * len(shape)):
-            z[i] = z[i] * place + series[k, i]
-
-
-@compiled(merged=True, borrows=True)
-def whole_step(
-    z: Any, rules: Array, step_matrix: Array, coupled: bool, in_cut: bool,
-    u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, end: Any,
-    shape: Shape,
-) -> Any:  # fmt: skip
-    """`end` as the coordinates (2n,) after a whole step that meets the quintic of these ends."""
-    n = len(shape)
+        push = rules[BY_SURFACE, i] * met
+        if forces[2] != 0.0:
+            push = fma(rules[BY_UNBALANCE, i], turning, push)
+        if on_tool != 0.0 or between != 0.0:
+            held = rules[BY_TOOL_FORCE, i] * on_tool + rules[BY_CUTTING_FORCE, i] * between
+            push = push + after(held, spread(0.0))
+        put(series, i, 0, push)
     if coupled:
-        for i in range(2 * n):
-            total = 0.0
-            for j in range(2 * n):
-                total += step_matrix[i, j] * z[j]
-            end = with_entry(end, i, total)
+        _solve_coupled(z, duration, rules, generator, direct[COUPLED] != 0.0, forces, series, work)
     else:
         for i in range(n):
-            x, y = z[i], z[n + i]
-            end = with_entry(end, i, rules[STEP_OWN, i] * x + rules[STEP_PARTNER, i] * y)
-            end = with_entry(
-                end, n + i, rules[STEP_OWN, n + i] * y + rules[STEP_PARTNER, n + i] * x
-            )
-    if in_cut:
+            own, partner = duration * rules[OWN, i], duration * rules[PARTNER, i]
+            back, other = duration * rules[PARTNER, n + i], duration * rules[OWN, n + i]
+            x, y = turned_on(
+                own, partner, back, other, lanes_at(series, i, 0), lanes_at(series, n + i, 0),
+                z[i], z[n + i],
+            )  # fmt: skip
+            put(series, i, 0, x)
+            put(series, n + i, 0, y)
+            if wide:
+                x, y = turned_on(
+                    own, partner, back, other, spread(0.0), spread(0.0), lane(x, LANES - 1),
+                    lane(y, LANES - 1),
+                )  # fmt: skip
+                put(series, i, LANES, x)
+                put(series, n + i, LANES, y)
+    weights, more = lanes_at(WEIGHTS, 0, 0), lanes_at(WEIGHTS, 0, LANES)
+    for i in range(2 * n):
+        terms = weights * lanes_at(series, i, 0)
+        if wide:
+            terms = fma(more, lanes_at(series, i, LANES), terms)
+        end[i] = z[i] + total(terms)
+    return wide  # type: ignore[no-any-return]  # a bool
+
+
+@compiled(borrows=True)
+def _solve_coupled(
+    z: Array, duration: float, rules: Array, generator: Array, coupled: bool, forces: Array,
+    series: Array, work: Array,
+) -> None:  # fmt: skip
+    """The series where every coordinate pushes every other: by itself, or through the damping."""
+    n = z.shape[0] // 2
+    term, following, rates = work[0], work[1], work[2]
+    for i in range(2 * n):
+        term[i] = z[i]
+    for k in range(TERMS):
         for i in range(2 * n):
-            more = (
-                (rules[STEP_SURFACE, i] * u0 + rules[STEP_SURFACE + 1, i] * d0)
-                + (rules[STEP_SURFACE + 2, i] * e0 + rules[STEP_SURFACE + 3, i] * u1)
-                + (rules[STEP_SURFACE + 4, i] * d1 + rules[STEP_SURFACE + 5, i] * e1)
-            )
-            end = with_entry(end, i, end[i] + more)
-    return end
-
-
-@compiled(merged=True, borrows=True)
-def add_held_forces(rules: Array, on_tool: float, between: float, end: Any, shape: Shape) -> Any:
-    """`end` with what forces, N, held for a whole step have done."""
-    for i in range(2 * len(shape)):
-        more = rules[STEP_TOOL_FORCE, i] * on_tool + rules[STEP_CUTTING_FORCE, i] * between
-        end = with_entry(end, i, end[i] + more)
-    return end
-
-
-@compiled(merged=True, borrows=True)
-def add_unbalance(
-    rules: Array, f0: float, g0: float, h0: float, f1: float, g1: float, h1: float, end: Any,
-    shape: Shape,
-) -> Any:  # fmt: skip
-    """`end` with what the force of an unbalance has done in a whole step, by its ends, N."""
-    for i in range(2 * len(shape)):
-        more = (
-            (rules[STEP_UNBALANCE, i] * f0 + rules[STEP_UNBALANCE + 1, i] * g0)
-            + (rules[STEP_UNBALANCE + 2, i] * h0 + rules[STEP_UNBALANCE + 3, i] * f1)
-            + (rules[STEP_UNBALANCE + 4, i] * g1 + rules[STEP_UNBALANCE + 5, i] * h1)
-        )
-        end = with_entry(end, i, end[i] + more)
-    return end
+            sum_of = series[i, k] if k < LANES else 0.0
+            if coupled:
+                for j in range(2 * n):
+                    sum_of = fma(duration * generator[i, j], term[j], sum_of)
+            else:
+                partner = i + n if i < n else i - n
+                sum_of = fma(duration * rules[OWN, i], term[i], sum_of)
+                sum_of = fma(duration * rules[PARTNER, i], term[partner], sum_of)
+            following[i] = sum_of
+        if forces[2] == 2.0:
+            rates[k] = 0.0
+            for i in range(2 * n):
+                rates[k] = fma(rules[RELATIVE_RATE_ROW, i], term[i], rates[k])
+            damped = forces[3] * rates[k]
+            if k >= 1:
+                damped += forces[4] * k * rates[k - 1]
+            if k >= 2:
+                damped += forces[5] * k * (k - 1.0) * rates[k - 2]
+            for i in range(2 * n):
+                following[i] += rules[BY_CUTTING_FORCE, i] * (duration * damped)
+        for i in range(2 * n):
+            series[i, k] = term[i] = following[i]
 
 
 @compiled(inline=True, borrows=True)
-def read_outputs(outputs: Array, z: Any, out: Array, shape: Shape) -> None:
-    """What the coordinates mean (OUTPUTS,), by the outputs (2n + 1, OUTPUTS) of the regime."""
-    for j in range(OUTPUTS):
-        out[j] = outputs[2 * len(shape), j]
-    for i in range(2 * len(shape)):
-        for j in range(OUTPUTS):
-            out[j] += outputs[i, j] * z[i]
+def coordinates_at(z: Array, series: Array, wide: bool, place: float, there: Array) -> None:
+    """Write the coordinates (2n,) at `place` of a solved piece that began with `z`."""
+    low = powers(place)
+    weights = low * lanes_at(WEIGHTS, 0, 0)
+    more = (low * lane(low, LANES - 1)) * lanes_at(WEIGHTS, 0, LANES)
+    for i in range(z.shape[0]):
+        terms = weights * lanes_at(series, i, 0)
+        if wide:
+            terms = fma(more, lanes_at(series, i, LANES), terms)
+        there[i] = z[i] + total(terms)
 
 
 @compiled(inline=True, borrows=True)
-def value_and_slope(series: Array, place: float) -> tuple[float, float]:
-    """A power series (TERMS,) and its derivative at `place`."""
-    value, slope = series[TERMS - 1], 0.0
-    for k in range(TERMS - 2, -1, -1):
-        slope = slope * place + value
-        value = value * place + series[k]
+def read_outputs(outputs: Array, z: Array, out: Array) -> None:
+    """What the coordinates mean (1, OUTPUTS), by the outputs (2n + 1, OUTPUTS) of the regime."""
+    seen = lanes_at(outputs, z.shape[0], 0)
+    for i in range(z.shape[0]):
+        seen = fma(z[i], lanes_at(outputs, i, 0), seen)
+    put(out, 0, 0, seen)
+
+
+@compiled(inline=True, borrows=True)
+def value_and_slope(series: Array, last: int, place: float) -> tuple[float, float]:
+    """A power series up to term `last`, and its derivative, at `place`."""
+    value, slope = series[last], 0.0
+    for k in range(last - 1, -1, -1):
+        slope = fma(slope, place, value)
+        value = fma(value, place, series[k])
     return value, slope

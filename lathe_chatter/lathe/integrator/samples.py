@@ -8,6 +8,7 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import noise
 from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator.spindle import sine_and_cosine
 
 COLUMNS = 8
 """Without accelerations, of which there are two more."""
@@ -28,8 +29,8 @@ def write_sample(
 @compiled(borrows=True)
 def add_runout(out: Array, row: int, settings: Array, speed: float) -> None:
     """Add to a sample what the sensors see of bodies that are not round; speed in rev/s."""
-    turn = 2.0 * math.pi * (out[row, 1] - math.floor(out[row, 1]))
-    cosine, swing = math.cos(turn), 2.0 * math.pi * speed * math.sin(turn)
+    sine, cosine = sine_and_cosine(out[row, 1])
+    swing = 2.0 * math.pi * speed * sine
     out[row, 2] += settings[layout.TOOL_RUNOUT] * cosine
     out[row, 3] -= settings[layout.TOOL_RUNOUT] * swing
     out[row, 4] += settings[layout.RUNOUT] * cosine

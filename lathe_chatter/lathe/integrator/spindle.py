@@ -12,8 +12,36 @@ from __future__ import annotations
 import math
 
 from lathe_chatter.compiled import compiled
+from lathe_chatter.lathe.integrator.lanes import fma
 
 _NEWTON_STEPS = 20
+_NEARLY = 1e-8
+"""A miss after which one more step of Newton's method leaves nothing."""
+_S1, _S2, _S3, _S4, _S5, _S6, _S7 = (1.0 / math.factorial(2 * k + 1) for k in range(1, 8))
+_C2, _C3, _C4, _C5, _C6, _C7, _C8 = (1.0 / math.factorial(2 * k) for k in range(2, 9))
+
+
+@compiled(inline=True, borrows=True)
+def sine_and_cosine(turns: float) -> tuple[float, float]:
+    """Of an angle in turns: by their series about the next quarter turn, to rounding.
+
+    A library's functions have other last bits on another processor.
+    """
+    rest = turns - math.floor(turns + 0.5)
+    quarter = math.floor(4.0 * rest + 0.5)
+    x = 2.0 * math.pi * (rest - 0.25 * quarter)
+    y = x * x
+    sine = fma(y, fma(y, fma(y, fma(y, fma(y, fma(y, -_S7, _S6), -_S5), _S4), -_S3), _S2), -_S1)
+    sine = fma(x * y, sine, x)
+    cosine = fma(y, fma(y, fma(y, fma(y, fma(y, fma(y, _C8, -_C7), _C6), -_C5), _C4), -_C3), _C2)
+    cosine = fma(y, fma(y, cosine, -0.5), 1.0)
+    if quarter == 0.0:
+        return sine, cosine
+    if quarter == 1.0:
+        return cosine, -sine
+    if quarter == -1.0:
+        return -cosine, sine
+    return -sine, -cosine
 
 
 @compiled(borrows=True)
@@ -21,9 +49,9 @@ def speed_and_slope(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> tuple[float, float]:
     """Omega and dOmega/dt at phase `phase` (cycles) of the variation."""
-    turn = 2.0 * math.pi * phase
-    factor = 1.0 + amplitude * math.sin(turn)
-    swing = amplitude * 2.0 * math.pi * frequency * math.cos(turn)
+    sine, cosine = sine_and_cosine(phase)
+    factor = 1.0 + amplitude * sine
+    swing = amplitude * 2.0 * math.pi * frequency * cosine
     return base * factor, slope * factor + base * swing
 
 
@@ -41,19 +69,21 @@ def turned(
     if amplitude == 0.0:
         return even
     z = math.pi * frequency * time
-    middle = 2.0 * math.pi * phase + z
+    sine, cosine = sine_and_cosine(phase + 0.5 * frequency * time)
     z2 = z * z
+    sine_z = cosine_z = 0.0
     sinc = 1.0 - z2 / 6.0 * (
         1.0 - z2 / 20.0 * (1.0 - z2 / 42.0 * (1.0 - z2 / 72.0 * (1.0 - z2 / 110.0)))
     )
     if z > 0.3:
-        sinc = math.sin(z) / z
+        sine_z, cosine_z = sine_and_cosine(0.5 * frequency * time)
+        sinc = sine_z / z
     lever = 1.0 - z2 / 10.0 * (1.0 - z2 / 28.0 * (1.0 - z2 / 54.0 * (1.0 - z2 / 88.0)))
     if z > 0.3:
-        lever = 3.0 * (math.sin(z) - z * math.cos(z)) / (z2 * z)
+        lever = 3.0 * (sine_z - z * cosine_z) / (z2 * z)
     mean = base + 0.5 * slope * time
-    swing = mean * math.sin(middle) * sinc * time
-    swing += slope * math.cos(middle) * lever * z * time * time / 6.0
+    swing = mean * sine * sinc * time
+    swing += slope * cosine * lever * z * time * time / 6.0
     return even + amplitude * swing
 
 
@@ -70,7 +100,7 @@ def time_to_turn(
             base + slope * time, slope, amplitude, phase + frequency * time, frequency
         )
         time -= miss / speed
-        if abs(miss) <= 1e-16 + 4e-16 * angle:
+        if abs(miss) <= _NEARLY * angle:
             break
     return time
 
@@ -80,5 +110,6 @@ def speed_curvature(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
     """The second derivative of Omega by time at phase `phase` (cycles) of the variation."""
-    turn, rate = 2.0 * math.pi * phase, 2.0 * math.pi * frequency
-    return amplitude * rate * (2.0 * slope * math.cos(turn) - base * rate * math.sin(turn))
+    rate = 2.0 * math.pi * frequency
+    sine, cosine = sine_and_cosine(phase)
+    return amplitude * rate * (2.0 * slope * cosine - base * rate * sine)

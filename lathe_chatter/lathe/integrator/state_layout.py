@@ -72,6 +72,9 @@ OUT_OF_CUT, IN_CUT = 0, 1
 FREE, ABOVE, BELOW = 0, 1, 2
 REGIMES = 6
 
+SPARE = 12
+"""Nodes for which there must be room before any step: those of a block, and two more."""
+
 # How a call of the loop ended.
 FINISHED, GUARD, SURFACE_FULL, EVENTS_FULL = 0, 1, 2, 3
 
@@ -103,5 +106,6 @@ OUTPUTS = 8
 # What acts on accelerations directly: (3, 4) of r'' in m/step2, tool and workpiece in m/s2.
 SURFACE, TOOL_FORCE, CUTTING_FORCE, UNBALANCE_FORCE = range(4)
 DIRECT = 16
-"""Twelve of these in a regime, then whether its coordinates are coupled (1) or in pairs (0)."""
-COUPLED = 12
+"""Twelve of these in a regime, then whether its coordinates are coupled (1) or in pairs (0), and
+its largest |lambda|, per step."""
+COUPLED, RATE = 12, 13

@@ -15,13 +15,14 @@ import numpy as np
 
 from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
+from lathe_chatter.lathe.integrator import block as at
 from lathe_chatter.lathe.integrator import noise, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.event_search import Machine, Scratch
 from lathe_chatter.lathe.integrator.event_step import take_step
-from lathe_chatter.lathe.integrator.piece import PIECE_SIZE
+from lathe_chatter.lathe.integrator.lanes import LANES
 from lathe_chatter.lathe.integrator.plain_steps import take_plain_steps
-from lathe_chatter.lathe.integrator.propagation import TERMS, Shape
+from lathe_chatter.lathe.integrator.propagation import TERMS
 from lathe_chatter.lathe.integrator.samples import (
     COLUMNS,
     add_runout,
@@ -36,15 +37,14 @@ _NONE = np.zeros(1, dtype=np.int64)
 
 
 def room_for(modes: int) -> Array:
-    """Room for a call of `advance`."""
-    width = 2 * modes
-    return surface.aligned(
-        8 * _LINE + 3 * _whole_lines(width) + (TERMS + 5) * _whole_lines(width + TERMS)
-    )
+    """Room for a call of `advance`; it must be left as it is between calls."""
+    width = _whole_lines(2 * modes)
+    return surface.aligned(_SMALL + 2 * width + width * (TERMS + LANES) + 3 * (width + TERMS))
 
 
-_LINE = 16
-"""Numbers in two lines of the processor's cache: room for each of the small arrays."""
+_BLOCK = 16 + 16 + 8 + 24 + 2 * TERMS
+_SMALL = _BLOCK + at.ROWS * LANES
+"""Numbers that are needed whatever the number of modes."""
 
 
 @compiled(inline=True, borrows=True)
@@ -78,7 +78,7 @@ def _move_origin(numbers: Array, counts: Integers, nodes: Array, settings: Array
 @compiled(inline=True, borrows=True)
 def _take_any_step(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
-    out: Array, row: int, events: Array, found: int, scratch: Scratch, shape: Shape,
+    out: Array, row: int, events: Array, found: int, scratch: Scratch,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Take a step whatever happens in it, and write sample `row` if it ends one.
 
@@ -94,8 +94,7 @@ def _take_any_step(
         key = noise.stream_key(seed, noise.CUTTING_FORCE_STREAM)
         between *= noise.normal(key, counts[layout.SAMPLES])
     found, status = take_step(
-        numbers, z, counts, nodes, settings, machine, on_tool, between, events, found, scratch,
-        shape,
+        numbers, z, counts, nodes, settings, machine, on_tool, between, events, found, scratch
     )  # fmt: skip
     if status != layout.FINISHED:
         return 0, found, status
@@ -103,7 +102,7 @@ def _take_any_step(
     if counts[layout.STEP] < counts[layout.STEPS]:
         return 0, found, layout.FINISHED
     counts[layout.STEP] = 0
-    seen, limit = scratch.seen, settings[layout.LIMIT]
+    seen, limit = scratch.seen[0], settings[layout.LIMIT]
     if not (abs(seen[layout.TOOL_X]) <= limit and abs(seen[layout.WORKPIECE_X]) <= limit):
         return 0, found, layout.GUARD
     counts[layout.SAMPLES] += 1
@@ -142,6 +141,38 @@ def _take_any_step(
     return 1, found, layout.FINISHED
 
 
+@compiled(borrows=True)
+def _cut_on(
+    numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
+    out: Array, events: Array, scratch: Scratch,
+) -> tuple[int, int, int]:  # fmt: skip
+    """The loop of `advance`, which only cuts its arrays into parts."""
+    # No literals: each would have the loops compiled once more.
+    row, found, status = int(_NONE[0]), int(_NONE[0]), int(_NONE[0])
+    while status == layout.FINISHED:
+        if numbers[layout.LEFT] == 0.0:
+            _move_origin(numbers, counts, nodes, settings)
+        regime = counts[layout.REGIME]
+        row = take_plain_steps(
+            numbers, z, counts, nodes, settings, machine.rules[regime],
+            machine.outputs[regime], machine.direct[regime],
+            machine.matrices[regime, 1], out, row, scratch.block, scratch.moved, scratch.other,
+        )  # fmt: skip
+        if row == out.shape[0]:
+            break
+        # Which loop takes a step must not depend on the room there is, or bits would.
+        if counts[layout.HEAD] + layout.SPARE >= nodes.shape[1]:
+            status = layout.SURFACE_FULL
+            break
+        if numbers[layout.LEFT] == 0.0 and numbers[layout.PLACE] >= settings[layout.SPAN]:
+            continue
+        wrote, found, status = _take_any_step(
+            numbers, z, counts, nodes, settings, machine, out, row, events, found, scratch
+        )
+        row += wrote
+    return row, found, status
+
+
 @compiled(nogil=True)
 def advance(
     numbers: Array,
@@ -151,7 +182,6 @@ def advance(
     out: Array,
     events: Array,
     room: Array,
-    shape: Shape,
 ) -> tuple[int, int, int]:
     """Cut on for `out.shape[0]` samples.
 
@@ -159,18 +189,17 @@ def advance(
         numbers: The remembered numbers (layout.NUMBERS_SIZE,), after them the coordinates (2n,)
             and the motion that they were made from (2n,), changed in place.
         counts: The remembered integers (layout.COUNTS_SIZE,), changed in place.
-        nodes: The surface (capacity, surface.NODE_SIZE), changed in place.
+        nodes: The surface (surface.NODE_SIZE, capacity), changed in place.
         flat: Settings and coefficients, from `coefficients.constants_of`.
         out: Written: the samples (n, 8), or (n, 10) with accelerations.
         events: Written: samples before the event, s since that sample, kind (m, 3).
         room: From `room_for`.
-        shape: One entry for each of the n modes.
 
     Returns:
         Samples written, events written, and FINISHED, GUARD, or what must be made larger
         before the rest is asked for: SURFACE_FULL or EVENTS_FULL.
     """
-    n2, regimes = 2 * len(shape), layout.REGIMES
+    n2, regimes = (numbers.shape[0] - layout.NUMBERS_SIZE) // 2, layout.REGIMES
     z = numbers[layout.NUMBERS_SIZE : layout.NUMBERS_SIZE + n2]
     settings = flat[: layout.SETTINGS_SIZE]
     first = layout.SETTINGS_SIZE
@@ -184,43 +213,22 @@ def advance(
     moves = flat[first:last].reshape((regimes, regimes, n2 + 1, n2))
     matrices = flat[last:].reshape((regimes, 2, n2, n2))
     machine = Machine(rules, outputs, direct, moves, matrices)
-    width = _whole_lines(n2 + TERMS)
-    series = 8 * _LINE + _whole_lines(n2)
-    work = series + TERMS * width
-    more = work + 5 * width
+    width = _whole_lines(n2)
+    series = _SMALL + 2 * width
+    moved = series + n2 * TERMS
+    work = moved + n2 * LANES
     scratch = Scratch(
-        room[:PIECE_SIZE], room[8 * _LINE : 8 * _LINE + n2],
-        room[_LINE : _LINE + layout.OUTPUTS],
-        room[series : series + TERMS * n2].reshape((TERMS, n2)),
-        room[work : work + 5 * (n2 + TERMS)].reshape((5, n2 + TERMS)),
-        room[2 * _LINE : 2 * _LINE + 6], room[3 * _LINE : 3 * _LINE + 6],
-        room[4 * _LINE : 4 * _LINE + 6], room[5 * _LINE : 5 * _LINE + TERMS],
-        room[more : more + 2 * n2].reshape((2, n2)),
+        room[:16], room[_SMALL : _SMALL + n2], room[_SMALL + width : _SMALL + width + n2],
+        room[32:40].reshape((1, 8)), room[series:moved].reshape((n2, TERMS)),
+        room[work : work + 3 * (n2 + TERMS)].reshape((3, n2 + TERMS)),
+        room[64:_BLOCK].reshape((2, TERMS)), room[16:32], room[40:64].reshape((1, 24)),
+        room[_BLOCK:_SMALL].reshape((at.ROWS, LANES)), room[moved:work].reshape((n2, LANES)),
     )  # fmt: skip
-    # No literals: each would have the loops compiled once more.
-    row, found, status = int(_NONE[0]), int(_NONE[0]), int(_NONE[0])
     if out.shape[0] > 0:
         counts[layout.MADE] = 0
-    while status == layout.FINISHED:
-        if numbers[layout.LEFT] == 0.0:
-            _move_origin(numbers, counts, nodes, settings)
-        regime = counts[layout.REGIME]
-        row = take_plain_steps(
-            numbers, z, counts, nodes, settings, rules[regime], outputs[regime], direct[regime],
-            matrices[regime, 1], out, row, scratch.seen, scratch.room, shape,
-        )  # fmt: skip
-        if row == out.shape[0]:
-            break
-        # Which loop takes a step must not depend on the room there is, or bits would.
-        if counts[layout.HEAD] + 2 >= nodes.shape[0]:
-            status = layout.SURFACE_FULL
-            break
-        if numbers[layout.LEFT] == 0.0 and numbers[layout.PLACE] >= settings[layout.SPAN]:
-            continue
-        wrote, found, status = _take_any_step(
-            numbers, z, counts, nodes, settings, machine, out, row, events, found, scratch, shape
-        )
-        row += wrote
+    row, found, status = _cut_on(
+        numbers, z, counts, nodes, settings, machine, out, events, scratch
+    )
     if settings[layout.SENSOR_NOISE] > 0.0 or settings[layout.ACCELERATION_NOISE] > 0.0:
         add_sensor_noise(out, row, counts, settings)
     return row, found, status

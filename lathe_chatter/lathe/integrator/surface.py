@@ -20,7 +20,7 @@ import numpy as np
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 
-# One node is one cache line of 8 numbers, see `empty_nodes`.
+# Rows: those of many nodes lie side by side, and are read and written together (lanes.py).
 (
     PLACE,  # steps at the target speed, from the origin
     HEIGHT,  # S, m
@@ -41,9 +41,9 @@ MERGE = 1e-9
 """Two instants closer than this part of a step are one."""
 
 
-def empty_nodes(*shape: int) -> Array:
-    """Room for nodes (*shape, NODE_SIZE), each in one line of the processor's cache."""
-    return aligned(*shape, NODE_SIZE)
+def empty_nodes(capacity: int) -> Array:
+    """Room for nodes (NODE_SIZE, capacity)."""
+    return aligned(NODE_SIZE, capacity)
 
 
 def aligned(*shape: int) -> Array:
@@ -62,19 +62,19 @@ def aligned_copy(values: Array) -> Array:
 
 
 def with_room(nodes: Array, capacity: int) -> Array:
-    """The same nodes (..., n, NODE_SIZE) with room for `capacity` of them."""
-    result = empty_nodes(*nodes.shape[:-2], capacity)
-    result[..., : nodes.shape[-2], :] = nodes
+    """The same nodes (NODE_SIZE, n) with room for `capacity` of them."""
+    result = empty_nodes(capacity)
+    result[:, : nodes.shape[1]] = nodes
     return result
 
 
 def fresh_surface(offset: float, turn: float, capacity: int) -> Array:
-    """A smooth surface before the first turn of `turn` steps: S = offset (capacity, 8)."""
+    """A smooth surface before the first turn of `turn` steps: S = offset (NODE_SIZE, capacity)."""
     nodes = empty_nodes(capacity)
-    nodes[:2, PLACE] = -turn, 0.0
-    nodes[:2, HEIGHT] = offset
-    nodes[:2, ORDER] = SMOOTH
-    nodes[:2, PITCH] = math.inf
+    nodes[PLACE, :2] = -turn, 0.0
+    nodes[HEIGHT, :2] = offset
+    nodes[ORDER, :2] = SMOOTH
+    nodes[PITCH, :2] = math.inf
     return nodes
 
 
@@ -106,10 +106,10 @@ def surface_at(nodes: Array, left: int, at: float) -> tuple[float, float, float]
     """S and its first two derivatives at place `at` between nodes `left` and `left + 1`."""
     right = left + 1
     return quintic_at(
-        nodes[left, PLACE], nodes[left, HEIGHT],
-        nodes[left, SLOPE_AFTER], nodes[left, CURVATURE_AFTER],
-        nodes[right, PLACE], nodes[right, HEIGHT],
-        nodes[right, SLOPE_BEFORE], nodes[right, CURVATURE_BEFORE], at,
+        nodes[PLACE, left], nodes[HEIGHT, left],
+        nodes[SLOPE_AFTER, left], nodes[CURVATURE_AFTER, left],
+        nodes[PLACE, right], nodes[HEIGHT, right],
+        nodes[SLOPE_BEFORE, right], nodes[CURVATURE_BEFORE, right], at,
     )  # fmt: skip
 
 
@@ -119,12 +119,12 @@ def write_node(
     pitch: float,
 ) -> None:  # fmt: skip
     """Write a node that is smooth until it turns out to be a corner."""
-    nodes[node, PLACE] = place
-    nodes[node, HEIGHT] = height
-    nodes[node, SLOPE_BEFORE] = nodes[node, SLOPE_AFTER] = slope
-    nodes[node, CURVATURE_BEFORE] = nodes[node, CURVATURE_AFTER] = curvature
-    nodes[node, ORDER] = SMOOTH
-    nodes[node, PITCH] = pitch
+    nodes[PLACE, node] = place
+    nodes[HEIGHT, node] = height
+    nodes[SLOPE_BEFORE, node] = nodes[SLOPE_AFTER, node] = slope
+    nodes[CURVATURE_BEFORE, node] = nodes[CURVATURE_AFTER, node] = curvature
+    nodes[ORDER, node] = SMOOTH
+    nodes[PITCH, node] = pitch
 
 
 @compiled(borrows=True)
@@ -134,14 +134,15 @@ def forget(nodes: Array, first: int, last: int, shift: float) -> None:
     Small numbers have small rounding, so an hour of cutting is as exact as its first second; and
     the memory is that of a few turns.
     """
-    for node in range(first, last + 1):
-        for entry in range(NODE_SIZE):
-            nodes[node - first, entry] = nodes[node, entry]
-        nodes[node - first, PLACE] -= shift
+    for entry in range(NODE_SIZE):
+        for node in range(first, last + 1):
+            nodes[entry, node - first] = nodes[entry, node]
+    for node in range(last + 1 - first):
+        nodes[PLACE, node] -= shift
 
 
 def recounted(nodes: Array, start: float, ratio: float, ahead: float, feeds: Array) -> Array:
-    """Nodes (n, NODE_SIZE) of a surface for another count of steps and another steady feed.
+    """Nodes (NODE_SIZE, n) of a surface for another count of steps and another steady feed.
 
     Args:
         nodes: As they are.
@@ -152,14 +153,14 @@ def recounted(nodes: Array, start: float, ratio: float, ahead: float, feeds: Arr
     """
     result = nodes.copy()
     old, new = feeds[0], feeds[1]
-    place = nodes[:, PLACE] - start
-    result[:, PLACE] = place * ratio
-    result[:, HEIGHT] = nodes[:, HEIGHT] - ahead + (old * place - new * (place * ratio))
+    place = nodes[PLACE] - start
+    result[PLACE] = place * ratio
+    result[HEIGHT] = nodes[HEIGHT] - ahead + (old * place - new * (place * ratio))
     for slope, curvature in (
         (SLOPE_BEFORE, CURVATURE_BEFORE),
         (SLOPE_AFTER, CURVATURE_AFTER),
     ):
-        result[:, slope] = (nodes[:, slope] + old) / ratio - new
-        result[:, curvature] = nodes[:, curvature] / (ratio * ratio)
-    result[:, PITCH] = nodes[:, PITCH] * ratio
+        result[slope] = (nodes[slope] + old) / ratio - new
+        result[curvature] = nodes[curvature] / (ratio * ratio)
+    result[PITCH] = nodes[PITCH] * ratio
     return result

@@ -11,6 +11,7 @@ from lathe_chatter.arrays import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
+from lathe_chatter.lathe.integrator.lanes import fma
 
 
 @compiled(inline=True, borrows=True)
@@ -42,13 +43,12 @@ def bend_of(
     turning: float,
 ) -> float:  # fmt: skip
     """r'', m/step2, of coordinates that meet the surface at `met` under forces, N."""
-    bend: float = 0.0
+    # In the order of a block of plain steps, so that it does not matter which of them it is.
+    bend: float = fma(direct[layout.SURFACE], met, direct[layout.UNBALANCE_FORCE] * turning)
     for i in range(z.shape[0]):
-        bend += outputs[i, layout.BEND] * z[i]
-    bend += direct[layout.SURFACE] * met
-    bend += direct[layout.UNBALANCE_FORCE] * turning
-    bend += direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
-    return bend
+        bend = fma(outputs[i, layout.BEND], z[i], bend)
+    forced = direct[layout.TOOL_FORCE] * on_tool + direct[layout.CUTTING_FORCE] * between
+    return bend + forced  # type: ignore[no-any-return]  # a float
 
 
 @compiled(borrows=True)
@@ -62,11 +62,11 @@ def finish_corner(
     order = counts[layout.SURFACE_CORNER]
     if counts[layout.REGIME] & layout.IN_CUT != 0:
         order = lower(order, counts[layout.CORNER])
-        slope, curvature = by_place(
-            numbers[layout.RELATIVE_RATE], bend, settings[layout.LEAD], speed, acceleration
-        )
-    nodes[head, surface.SLOPE_AFTER] = slope
-    nodes[head, surface.CURVATURE_AFTER] = curvature
+        slope, curvature = numbers[layout.RELATIVE_RATE], bend
+        if speed != 1.0 or acceleration != 0.0:
+            slope, curvature = by_place(slope, bend, settings[layout.LEAD], speed, acceleration)
+    nodes[surface.SLOPE_AFTER, head] = slope
+    nodes[surface.CURVATURE_AFTER, head] = curvature
     if order > 0:
-        nodes[head, surface.ORDER] = min(nodes[head, surface.ORDER], order)
+        nodes[surface.ORDER, head] = min(nodes[surface.ORDER, head], order)
     counts[layout.CORNER] = counts[layout.SURFACE_CORNER] = 0

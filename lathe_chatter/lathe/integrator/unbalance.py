@@ -7,6 +7,7 @@ import math
 from lathe_chatter.arrays import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator.spindle import sine_and_cosine
 
 
 @compiled(inline=True, borrows=True)
@@ -30,8 +31,7 @@ def unbalance_force(
         ratio_curvature: The second derivative.
     """
     per_step = 2.0 * math.pi / settings[layout.TURN]
-    turn = 2.0 * math.pi * (angle - math.floor(angle))
-    cosine, sine = math.cos(turn), math.sin(turn)
+    sine, cosine = sine_and_cosine(angle)
     w, dw, ddw = ratio * per_step, ratio_slope * per_step, ratio_curvature * per_step
     square = w * w
     size = settings[layout.UNBALANCE]

@@ -17,11 +17,11 @@ from lathe_chatter.lathe.integrator.propagation import TERMS
 def _crossing(series: Array, sign: float) -> float:
     margin = sign * series
     p = Polynomial(margin)
-    return first_crossing(margin, float(p(1.0)), float(p.deriv()(1.0)))
+    return first_crossing(margin, TERMS, float(p(1.0)), float(p.deriv()(1.0)))
 
 
 def _series(coefficients: Sequence[float] | Array) -> Array:
-    series = np.zeros(TERMS)
+    series = np.zeros(TERMS + 1)
     series[: len(coefficients)] = coefficients
     return series
 
@@ -67,9 +67,8 @@ def test_a_margin_that_rises_from_zero_and_falls_below_it_crosses_once() -> None
 def test_a_piece_of_a_vibration() -> None:
     """cos(a + 0.12 s) by its Taylor series: the zero is known in closed form."""
     start, rate = 0.5 * math.pi - 0.07, 0.12
-    series = _series(
-        [math.cos(start + 0.5 * math.pi * k) * rate**k / math.factorial(k) for k in range(TERMS)]
-    )
+    derivatives = [math.cos(start + 0.5 * math.pi * k) * rate**k for k in range(TERMS + 1)]
+    series = _series([each / math.factorial(k) for k, each in enumerate(derivatives)])
     assert _crossing(series, 1.0) == pytest.approx(0.07 / 0.12, abs=1e-14)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -62,34 +61,47 @@ def _start(n: int, seed: int) -> tuple[Array, Array, Array]:
     return rng.normal(size=2 * n) * 1e-6, rng.normal(size=6) * 1e-6, rng.normal(size=6) * 1e-1
 
 
+def _solved(
+    constants: Constants, regime: int, z: Array, duration: float, given: Array
+) -> tuple[Array, Array, bool]:
+    """The end of a piece, its series, and whether all of it counts; with forces and unbalance."""
+    width = len(z)
+    series, end = np.empty((width, TERMS)), np.empty(width)
+    work = np.empty((3, width + TERMS))
+    basis = constants.bases[regime]
+    direct = np.zeros(layout.DIRECT)
+    direct[layout.COUPLED], direct[layout.RATE] = float(not basis.in_pairs), basis.rate
+    forces = np.array([_TOOL_FORCE, _BETWEEN, 1.0, 0.0, 0.0, 0.0])
+    wide = propagation.solve_piece(
+        z, duration, constants.rules[regime], basis.generator, direct, forces, given, series,
+        work, end,
+    )  # fmt: skip
+    return end, series, wide
+
+
 @pytest.mark.parametrize('regime', range(layout.REGIMES))
 @pytest.mark.parametrize('duration', [0.2, 0.37, 1.0])
 @pytest.mark.parametrize('machine', _MACHINES.values(), ids=_MACHINES)
 def test_a_piece_is_the_matrix_exponential(machine: Machine, regime: int, duration: float) -> None:
     constants = constants_of(LatheSetup(machine), _CUT, 1)
     n = len(constants.shapes.frequency)
-    shape = (0.0,) * n
     moved, surface, turning = _start(n, regime)
     basis = constants.bases[regime]
     z = basis.inverse @ (moved - constants.rests[regime])
-    series, work, end = np.empty((TERMS, 2 * n)), np.empty((5, 2 * n + TERMS)), np.empty(2 * n)
-    forces = np.array([_TOOL_FORCE, _BETWEEN, 1.0, 0.0, 0.0, 0.0])
-    propagation.solve_piece(
-        z, duration, constants.rules[regime], basis.generator, not basis.in_pairs, forces,
-        surface, turning, series, work, end, shape,
-    )  # fmt: skip
-    derivatives = [
-        given[k] * math.factorial(k) / duration**k
-        for given in (surface, turning)
-        for k in range(6)
-    ]
-    start = np.concatenate([moved, derivatives, [1.0]])
+    given = np.zeros((2, TERMS))
+    given[0, :6], given[1, :6] = surface, turning
+    end, series, wide = _solved(constants, regime, z, duration, given)
+    by_time = duration ** np.arange(6)
+    start = np.concatenate([moved, surface / by_time, turning / by_time, [1.0]])
     expected = (_exact(machine, constants, regime, duration) @ start)[: 2 * n]
     found = basis.vectors @ end + constants.rests[regime]
     assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
     middle = np.empty(2 * n)
-    propagation.coordinates_at(series, 0.4, middle, shape)
-    by_series = [Polynomial(series[:, i])(0.4) for i in range(2 * n)]
+    propagation.coordinates_at(z, series, wide, 0.4, middle)
+    weights = np.array([1.0 / math.factorial(k + 1) for k in range(TERMS if wide else TERMS // 2)])
+    by_series = [
+        Polynomial(np.append(z[i], series[i, : len(weights)] * weights))(0.4) for i in range(2 * n)
+    ]
     assert middle == pytest.approx(by_series, rel=1e-13, abs=1e-20)
 
 
@@ -101,24 +113,20 @@ def test_a_whole_step_is_the_piece_of_that_length(machine: Machine, regime: int)
     moved, ends, turning = _start(n, 7 + regime)
     basis, rules = constants.bases[regime], constants.rules[regime]
     z = basis.inverse @ moved
-    step_matrix = expm(basis.generator)
-    in_cut = bool(regime & layout.IN_CUT)
-    call: Any = propagation
-    found = call.whole_step.py_func(
-        z, rules, step_matrix, not basis.in_pairs, in_cut, *ends, np.empty(2 * n), (0.0,) * n
-    )
-    found = call.add_held_forces.py_func(rules, _TOOL_FORCE, _BETWEEN, found, (0.0,) * n)
-    found = call.add_unbalance.py_func(rules, *turning, found, (0.0,) * n)
-    hold, turns = np.empty(6), np.empty(6)
-    propagation.quintic(*ends, hold)
-    propagation.quintic(*turning, turns)
-    series, work, end = np.empty((TERMS, 2 * n)), np.empty((5, 2 * n + TERMS)), np.empty(2 * n)
-    propagation.solve_piece(
-        z, 1.0, rules, basis.generator, not basis.in_pairs,
-        np.array([_TOOL_FORCE, _BETWEEN, 1.0, 0.0, 0.0, 0.0]), hold, turns, series, work, end,
-        (0.0,) * n,
-    )  # fmt: skip
-    assert np.abs(np.array(found) - end).max() < 1e-13 * np.abs(end).max()
+    given = np.zeros((2, TERMS))
+    propagation.quintic(*ends, given, 0)
+    propagation.quintic(*turning, given, 1)
+    end, _, _ = _solved(constants, regime, z, 1.0, given)
+    found = expm(basis.generator) @ z
+    found += ends @ rules[layout.STEP_SURFACE : layout.STEP_SURFACE + 6]
+    found += turning @ rules[layout.STEP_UNBALANCE : layout.STEP_UNBALANCE + 6]
+    found += rules[layout.STEP_TOOL_FORCE] * _TOOL_FORCE
+    found += rules[layout.STEP_CUTTING_FORCE] * _BETWEEN
+    assert np.abs(found - end).max() < 1e-13 * np.abs(end).max()
+    if basis.in_pairs:
+        partners = np.append(np.arange(n, 2 * n), np.arange(n))
+        turned = rules[layout.STEP_OWN] * z + rules[layout.STEP_PARTNER] * z[partners]
+        assert turned == pytest.approx(expm(basis.generator) @ z, rel=1e-12, abs=1e-12)
 
 
 def test_only_nearly_equal_eigenvalues_stay_coupled() -> None:
@@ -130,9 +138,9 @@ def test_only_nearly_equal_eigenvalues_stay_coupled() -> None:
 
 def test_the_quintic_has_the_given_values_slopes_and_curvatures() -> None:
     given = [0.3, -1.0, 2.0, 0.7, -1.3, 0.4]
-    coefficients = np.empty(6)
-    propagation.quintic(*given, coefficients)
-    p = Polynomial(coefficients)
+    derivatives = np.zeros((1, 6))
+    propagation.quintic(*given, derivatives, 0)
+    p = Polynomial([d / math.factorial(k) for k, d in enumerate(derivatives[0])])
     found = [q(place) for place in (0.0, 1.0) for q in (p, p.deriv(), p.deriv(2))]
     assert found == pytest.approx(given, rel=1e-14)
 
@@ -140,9 +148,9 @@ def test_the_quintic_has_the_given_values_slopes_and_curvatures() -> None:
 @pytest.mark.parametrize('part', [0.0, 0.3, 0.999])
 def test_the_weights_between_two_nodes_are_those_of_the_quintic(part: float) -> None:
     given = [0.3, -1.0, 2.0, 0.7, -1.3, 0.4]
-    coefficients = np.empty(6)
-    propagation.quintic(*given, coefficients)
-    p = Polynomial(coefficients)
+    derivatives = np.zeros((1, 6))
+    propagation.quintic(*given, derivatives, 0)
+    p = Polynomial([d / math.factorial(k) for k, d in enumerate(derivatives[0])])
     u0, d0, e0, u1, d1, e1 = given
     found = between_nodes(part) @ [u1 - u0, d0, d1, e0, e1]
     assert found == pytest.approx([p(part) - u0, p.deriv()(part), p.deriv(2)(part)], rel=1e-12)
@@ -151,5 +159,5 @@ def test_the_weights_between_two_nodes_are_those_of_the_quintic(part: float) -> 
 def test_a_series_with_its_slope() -> None:
     series = np.random.default_rng(3).normal(size=TERMS)
     p = Polynomial(series)
-    found = propagation.value_and_slope(series, 0.7)
+    found = propagation.value_and_slope(series, TERMS - 1, 0.7)
     assert found == pytest.approx((p(0.7), p.deriv()(0.7)), rel=1e-14)

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
-from lathe_chatter.lathe.integrator.spindle import speed_and_slope, time_to_turn, turned
+from lathe_chatter.lathe.integrator.spindle import (
+    sine_and_cosine,
+    speed_and_slope,
+    time_to_turn,
+    turned,
+)
 
 _LAWS = [  # base rev/s, slope rev/s2, amplitude, phase, frequency Hz
     (50.0, 0.0, 0.0, 0.0, 1.0),
@@ -81,3 +87,13 @@ def test_the_series_and_the_closed_form_meet() -> None:
     below, above = turned(border - step, *law), turned(border + step, *law)
     speed, _ = speed_and_slope(50.0 + 300.0 * border, 300.0, 0.5, 0.2 + 100.0 * border, 100.0)
     assert above - below == pytest.approx(2.0 * step * speed, abs=_TRUNCATION * below)
+
+
+def test_sine_and_cosine_of_turns_are_right_to_rounding() -> None:
+    """Against 30 digits."""
+    with mpmath.workdps(30):
+        for turns in np.random.default_rng(4).uniform(-3.0, 3.0, 2000).tolist():
+            angle = 2 * mpmath.pi * mpmath.mpf(turns)
+            exact = mpmath.sin(angle), mpmath.cos(angle)
+            for mine, right in zip(sine_and_cosine(turns), exact, strict=True):
+                assert abs(mine - right) < 2.5e-16

@@ -13,14 +13,14 @@ _QUINTIC = Polynomial([0.3, -1.0, 2.0, 0.7, -1.3, 0.4])
 
 
 def _nodes(angles: list[float]) -> Array:
-    nodes = np.zeros((len(angles) + 3, surface.NODE_SIZE))
+    nodes = np.zeros((surface.NODE_SIZE, len(angles) + 3))
     slope, curvature = _QUINTIC.deriv(), _QUINTIC.deriv(2)
     for k, angle in enumerate(angles):
-        nodes[k, surface.PLACE] = angle
-        nodes[k, surface.HEIGHT] = _QUINTIC(angle)
-        nodes[k, [surface.SLOPE_BEFORE, surface.SLOPE_AFTER]] = slope(angle)
-        nodes[k, [surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER]] = curvature(angle)
-        nodes[k, surface.ORDER] = surface.SMOOTH
+        nodes[surface.PLACE, k] = angle
+        nodes[surface.HEIGHT, k] = _QUINTIC(angle)
+        nodes[[surface.SLOPE_BEFORE, surface.SLOPE_AFTER], k] = slope(angle)
+        nodes[[surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER], k] = curvature(angle)
+        nodes[surface.ORDER, k] = surface.SMOOTH
     return nodes
 
 
@@ -34,8 +34,8 @@ def test_a_quintic_is_held_exactly(angle: float) -> None:
 
 def test_a_corner_has_two_sides() -> None:
     nodes = _nodes([-0.2, 0.1, 0.4])
-    nodes[1, surface.SLOPE_AFTER] += 5.0
-    nodes[1, surface.CURVATURE_AFTER] -= 3.0
+    nodes[surface.SLOPE_AFTER, 1] += 5.0
+    nodes[surface.CURVATURE_AFTER, 1] -= 3.0
     before = surface.surface_at(nodes, 0, 0.1)
     after = surface.surface_at(nodes, 1, 0.1)
     assert after[0] == pytest.approx(before[0], rel=1e-14)
@@ -46,11 +46,11 @@ def test_a_corner_has_two_sides() -> None:
 def test_the_error_of_the_hold_falls_with_the_sixth_power_of_the_step() -> None:
     errors = []
     for width in (0.2, 0.1):
-        nodes = np.zeros((2, surface.NODE_SIZE))
+        nodes = np.zeros((surface.NODE_SIZE, 2))
         for k, angle in enumerate((0.5, 0.5 + width)):
-            nodes[k, surface.PLACE], nodes[k, surface.HEIGHT] = angle, np.sin(7.0 * angle)
-            nodes[k, [surface.SLOPE_BEFORE, surface.SLOPE_AFTER]] = 7.0 * np.cos(7.0 * angle)
-            nodes[k, [surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER]] = -49.0 * np.sin(
+            nodes[surface.PLACE, k], nodes[surface.HEIGHT, k] = angle, np.sin(7.0 * angle)
+            nodes[[surface.SLOPE_BEFORE, surface.SLOPE_AFTER], k] = 7.0 * np.cos(7.0 * angle)
+            nodes[[surface.CURVATURE_BEFORE, surface.CURVATURE_AFTER], k] = -49.0 * np.sin(
                 7.0 * angle
             )
         places = 0.5 + width * np.linspace(0.0, 1.0, 101)
@@ -61,7 +61,7 @@ def test_the_error_of_the_hold_falls_with_the_sixth_power_of_the_step() -> None:
 
 def test_before_the_first_turn_the_surface_is_smooth() -> None:
     nodes = surface.fresh_surface(3e-6, 200.0, 16)
-    assert nodes.shape == (16, surface.NODE_SIZE)
+    assert nodes.shape == (surface.NODE_SIZE, 16)
     for place in (-200.0, -60.3, 0.0):
         height, slope, curvature = surface.surface_at(nodes, 0, place)
         assert height == pytest.approx(3e-6, rel=1e-14)
@@ -81,7 +81,7 @@ def test_a_surface_counted_otherwise_is_the_same_surface() -> None:
     """Of a steady feed of its own, the height over a common origin is one at every angle."""
     nodes, start, ahead = _nodes([-0.2, 0.1, 0.4]), 0.3, 0.05
     old, new, ratio = 0.7, 0.2, 2.5
-    other = surface.recounted(nodes[:3], start, ratio, ahead, np.array([old, new]))
+    other = surface.recounted(nodes[:, :3], start, ratio, ahead, np.array([old, new]))
     for place in (0.15, 0.2, 0.39):
         height, slope, _ = surface.surface_at(nodes, 1, place)
         again, slope_again, _ = surface.surface_at(other, 1, (place - start) * ratio)
@@ -93,10 +93,10 @@ def test_a_surface_counted_otherwise_is_the_same_surface() -> None:
 def test_room_for_more_nodes_keeps_every_bit() -> None:
     nodes = _nodes([-0.2, 0.1, 0.4])
     more = surface.with_room(nodes, 100)
-    assert more.shape == (100, surface.NODE_SIZE)
-    assert np.array_equal(more[: len(nodes)], nodes)
-    assert not more[len(nodes) :].any()
+    assert more.shape == (surface.NODE_SIZE, 100)
+    assert np.array_equal(more[:, : nodes.shape[1]], nodes)
+    assert not more[:, nodes.shape[1] :].any()
 
 
-def test_a_node_lies_in_one_line_of_the_cache() -> None:
-    assert all(surface.empty_nodes(3, n).ctypes.data % 64 == 0 for n in range(1, 20))
+def test_rows_begin_where_a_line_of_the_cache_does() -> None:
+    assert all(surface.empty_nodes(n).ctypes.data % 64 == 0 for n in range(1, 20))

@@ -1,0 +1,333 @@
+"""Eight steps at once: eight numbers that a processor adds or multiplies as one.
+
+Steps in which nothing happens are alike, so all but their recursion is done for a block of them:
+step k of the block is lane k. Each lane has the bits that its step would have by itself, hence
+it does not matter how a run is cut into blocks.
+
+`fma` is a b + c rounded once, by the processor or by the C library, with the same bits from both.
+
+These are LLVM's vectors, so nothing depends on what a compiler makes of a loop. What each function
+does stands in lanes_in_python.py.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, overload, register_model
+
+from lathe_chatter.lathe.integrator import lanes_in_python as plain
+
+LANES = plain.LANES
+_DOUBLE, _INT = ir.DoubleType(), ir.IntType(64)
+_OPTIONS = {'forceinline': True, '_nrt': False, 'error_model': 'numpy'}
+_UNALIGNED = 8
+
+
+class _Vector(types.Type):  # type: ignore[misc]  # Numba has no types
+    """Numbers, or whether something is so, in eight lanes."""
+
+    def __init__(self, name: str, part: ir.Type) -> None:
+        super().__init__(name)
+        self.vector = ir.VectorType(part, LANES)
+
+
+_NUMBERS, _MASK = _Vector('Lanes', _DOUBLE), _Vector('Mask', ir.IntType(1))
+
+
+@register_model(_Vector)
+class _Model(models.PrimitiveModel):  # type: ignore[misc]  # Numba has no types
+    def __init__(self, manager: Any, numba_type: _Vector) -> None:
+        super().__init__(manager, numba_type, numba_type.vector)
+
+
+def _constant(values: Any) -> ir.Constant:
+    return ir.Constant(ir.VectorType(_DOUBLE, LANES), [ir.Constant(_DOUBLE, v) for v in values])
+
+
+def _shuffled(builder: Any, one: Any, other: Any, places: Any) -> Any:
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(places))
+    return builder.shuffle_vector(one, other, mask)
+
+
+def _part(builder: Any, lanes: Any, k: int) -> Any:
+    return builder.extract_element(lanes, ir.Constant(ir.IntType(32), k))
+
+
+def _in_all(builder: Any, kind: Any, value: Any) -> Any:
+    """A value of a Numba type as lanes."""
+    if kind is _NUMBERS or kind is _MASK:
+        return value
+    empty = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
+    first = builder.insert_element(empty, value, ir.Constant(ir.IntType(32), 0))
+    return _shuffled(builder, first, empty, [0] * LANES)
+
+
+def _lanes_of(builder: Any, signature: Any, values: Any) -> list[Any]:
+    """All arguments of a function as lanes."""
+    return [_in_all(builder, k, value) for k, value in zip(signature.args, values, strict=True)]
+
+
+def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
+    vector = isinstance(a.type, ir.VectorType)
+    name = f'llvm.fma.{f"v{LANES}f64" if vector else "f64"}'
+    of = ir.FunctionType(a.type, [a.type] * 3)
+    return builder.call(cgutils.get_or_insert_function(builder.module, of, name), [a, b, c])
+
+
+def _place(context: Any, builder: Any, kind: Any, array: Any, row: Any, column: Any) -> Any:
+    """A pointer to eight numbers of a row."""
+    parts = context.make_array(kind)(context, builder, array)
+    stride = cgutils.unpack_tuple(builder, parts.strides, kind.ndim)[0]
+    begin = cgutils.pointer_add(builder, parts.data, builder.mul(row, stride))
+    pointer = builder.gep(begin, [column])
+    return builder.bitcast(pointer, ir.VectorType(_DOUBLE, LANES).as_pointer())
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _load(_typing: Any, rows: Any, row: Any, column: Any) -> Any:  # noqa: ARG001
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        pointer = _place(context, builder, signature.args[0], *values)
+        return builder.load(pointer, align=_UNALIGNED)
+
+    return _NUMBERS(rows, types.intp, types.intp), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _store(_typing: Any, rows: Any, row: Any, column: Any, value: Any) -> Any:  # noqa: ARG001
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        pointer = _place(context, builder, signature.args[0], *values[:3])
+        stored = _in_all(builder, signature.args[3], values[3])
+        builder.store(stored, pointer, align=_UNALIGNED)
+        return context.get_dummy_value()
+
+    kept = _NUMBERS if value is _NUMBERS else types.float64
+    return types.void(rows, types.intp, types.intp, kept), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _store_samples(_typing: Any, rows: Any, row: Any, values: Any) -> Any:  # noqa: ARG001
+    def emit(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        lines = cgutils.unpack_tuple(builder, given[2], LANES)
+        # A transposition: pairs of lines exchange halves, quarters and eighths.
+        for width in (1, 2, 4):
+            turned = list(lines)
+            for k in range(LANES):
+                if k & width:
+                    continue
+                one, other = lines[k], lines[k | width]
+                places = range(LANES)
+                turned[k] = _shuffled(
+                    builder, one, other,
+                    [p if not p & width else LANES + (p ^ width) for p in places],
+                )  # fmt: skip
+                turned[k | width] = _shuffled(
+                    builder, one, other,
+                    [p ^ width if not p & width else LANES + p for p in places],
+                )  # fmt: skip
+            lines = turned
+        column = ir.Constant(_INT, 0)
+        for k, line in enumerate(lines):
+            row = builder.add(given[1], ir.Constant(_INT, k))
+            pointer = _place(context, builder, signature.args[0], given[0], row, column)
+            builder.store(line, pointer, align=_UNALIGNED)
+        return context.get_dummy_value()
+
+    return types.void(rows, types.intp, types.UniTuple(_NUMBERS, LANES)), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _spread(_typing: Any, value: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return _in_all(builder, signature.args[0], values[0])
+
+    return _NUMBERS(types.float64), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _counted(_typing: Any, first: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        every = _in_all(builder, signature.args[0], values[0])
+        return builder.fadd(every, _constant(map(float, range(LANES))))
+
+    return _NUMBERS(types.float64), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _after(_typing: Any, first: Any, lanes: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        every = _in_all(builder, signature.args[0], values[0])
+        return _shuffled(builder, values[1], every, [LANES, *range(LANES - 1)])
+
+    return _NUMBERS(types.float64, _NUMBERS), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _before(_typing: Any, lanes: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        return _shuffled(builder, values[0], values[0], [*range(1, LANES), LANES - 1])
+
+    return _NUMBERS(_NUMBERS), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _lane(_typing: Any, lanes: Any, k: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        return builder.extract_element(*values)
+
+    return types.float64(_NUMBERS, types.intp), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _fused(_typing: Any, a: Any, b: Any, c: Any) -> Any:
+    kinds = [kind if kind is _NUMBERS else types.float64 for kind in (a, b, c)]
+    result = _NUMBERS if _NUMBERS in kinds else types.float64
+
+    def emit(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        if result is _NUMBERS:
+            values = _lanes_of(builder, signature, values)
+        return _fma(builder, *values)
+
+    return result(*kinds), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _first_of(_typing: Any, mask: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        bits = builder.zext(builder.bitcast(values[0], ir.IntType(LANES)), _INT)
+        ended = builder.or_(bits, ir.Constant(_INT, 1 << LANES))
+        return builder.cttz(ended, ir.Constant(ir.IntType(1), 1))
+
+    return types.intp(_MASK), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _total(_typing: Any, lanes: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        lanes = values[0]
+        for width in (4, 2, 1):
+            lanes = builder.fadd(lanes, _shuffled(builder, lanes, lanes, [
+                (k + width) % LANES for k in range(LANES)
+            ]))  # fmt: skip
+        return _part(builder, lanes, 0)
+
+    return types.float64(_NUMBERS), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _powers(_typing: Any, x: Any) -> Any:  # noqa: ARG001
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        x = values[0]
+        square = builder.fmul(x, x)
+        fourth = builder.fmul(square, square)
+        low = [x, square, builder.fmul(square, x), fourth]
+        lanes = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
+        for k in range(LANES):
+            value = low[k] if k < 4 else builder.fmul(low[k - 4], fourth)
+            lanes = builder.insert_element(lanes, value, ir.Constant(ir.IntType(32), k))
+        return lanes
+
+    return _NUMBERS(types.float64), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _turned_on(
+    _typing: Any, own: Any, partner: Any, back: Any, own_of_partner: Any, pushes: Any,  # noqa: ARG001
+    others: Any, x: Any, y: Any,  # noqa: ARG001
+) -> Any:  # fmt: skip
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        own, partner, back, other_own, pushes, others, x, y = values
+        xs = ys = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
+        for k in range(LANES):
+            push, other = _part(builder, pushes, k), _part(builder, others, k)
+            moved = _fma(builder, partner, y, _fma(builder, own, x, push))
+            y = _fma(builder, back, x, _fma(builder, other_own, y, other))
+            x = moved
+            place = ir.Constant(ir.IntType(32), k)
+            xs = builder.insert_element(xs, x, place)
+            ys = builder.insert_element(ys, y, place)
+        return cgutils.pack_array(builder, [xs, ys])
+
+    numbers = [types.float64] * 4 + [_NUMBERS] * 2 + [types.float64] * 2
+    return types.UniTuple(_NUMBERS, 2)(*numbers), emit
+
+
+def _between(emit: Callable[[Any, Any, Any], Any], result: Any) -> Any:
+    """An intrinsic of two lanes, or of lanes and a number."""
+
+    @intrinsic  # type: ignore[untyped-decorator]  # Numba
+    def code(_typing: Any, a: Any, b: Any) -> Any:
+        kinds = [kind if isinstance(kind, _Vector) else types.float64 for kind in (a, b)]
+
+        def generate(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            return emit(builder, *_lanes_of(builder, signature, values))
+
+        return result(*kinds), generate
+
+    return code
+
+
+def _compared(sign: str) -> Any:
+    return _between(lambda builder, a, b: builder.fcmp_ordered(sign, a, b), _MASK)
+
+
+def _chosen(sign: str) -> Any:
+    """The one of two that compares so to the other."""
+    return _between(
+        lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, a, b), a, b), _NUMBERS
+    )
+
+
+_OPERATORS = {
+    operator.add: _between(lambda builder, a, b: builder.fadd(a, b), _NUMBERS),
+    operator.sub: _between(lambda builder, a, b: builder.fsub(a, b), _NUMBERS),
+    operator.mul: _between(lambda builder, a, b: builder.fmul(a, b), _NUMBERS),
+    operator.truediv: _between(lambda builder, a, b: builder.fdiv(a, b), _NUMBERS),
+    operator.lt: _compared('<'),
+    operator.gt: _compared('>'),
+    operator.le: _compared('<='),
+    operator.eq: _compared('=='),
+    operator.and_: _between(lambda builder, a, b: builder.and_(a, b), _MASK),
+    operator.or_: _between(lambda builder, a, b: builder.or_(a, b), _MASK),
+}
+
+
+def _overloaded(function: Any, code: Any) -> None:
+    @overload(function, jit_options=_OPTIONS)  # type: ignore[untyped-decorator]  # Numba
+    def _of_lanes(a: Any, b: Any) -> Any:
+        def of_either(a: Any, b: Any) -> Any:
+            return code(a, b)
+
+        return of_either if isinstance(a, _Vector) or isinstance(b, _Vector) else None
+
+
+for _operator, _code in _OPERATORS.items():
+    _overloaded(_operator, _code)
+
+
+@overload(operator.neg, jit_options=_OPTIONS)  # type: ignore[untyped-decorator]  # Numba
+def _negative(a: Any) -> Any:
+    def of_each(a: Any) -> Any:
+        return a * -1.0
+
+    return of_each if a is _NUMBERS else None
+
+
+lanes_at, put, put_samples = _load, _store, _store_samples
+spread, counted, after, before, lane = _spread, _counted, _after, _before, _lane
+fma, first_of, turned_on = _fused, _first_of, _turned_on
+total, powers = _total, _powers
+smaller, larger = _chosen('<'), _chosen('>')
+if numba.config.DISABLE_JIT:
+    lanes_at, put, put_samples = plain.lanes_at, plain.put, plain.put_samples
+    spread, counted, after = plain.spread, plain.counted, plain.after
+    before, lane, fma = plain.before, plain.lane, plain.fma
+    first_of, turned_on = plain.first_of, plain.turned_on
+    total, powers = plain.total, plain.powers
+    smaller, larger = plain.smaller, plain.larger
