@@ -374,3 +374,16 @@ class _Search:
             grown = max(grown + rate, 0.0)
             highest = max(highest, grown)
         return math.exp(min(highest, 50.0))
+
+
+def change_words(changes: Mapping[str, float], cut: Cut) -> str:
+    """Changes of a cut in words."""
+    return ', '.join(f'{n} from {getattr(cut, n):.6g} to {v:.6g}' for n, v in changes.items())
+
+
+def expectation(move: Move) -> str:
+    """What is expected of a move, in words."""
+    margin = '' if math.isnan(move.margin) else f', margin {100.0 * move.margin:.0f} %'
+    kept = f'{100.0 * move.kept:.0f} % of the removal rate'
+    sure = f'on {100.0 * move.share:.0f} % of the machines that this may be'
+    return f'predicted: growth {move.growth_rate:.1f} 1/s{margin}, {kept}; stable {sure}'

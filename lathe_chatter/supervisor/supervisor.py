@@ -13,9 +13,10 @@ from statistics import median
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.supervisor.moves import (
     Limits,
-    Move,
     as_heard,
     chance_of,
+    change_words,
+    expectation,
     fits,
     may_be,
     moves_for,
@@ -243,7 +244,7 @@ class Supervisor:
         for move in chain.from_iterable(found):
             if not any(_same(move.cut, cut) for cut in (seen.cut, *self._tried)):
                 changes = move.changes_from(seen.cut)
-                said = f'{why}: {{}} set {_changes(changes, seen.cut)} ({_expected(move)})'
+                said = f'{why}: {{}} set {change_words(changes, seen.cut)} ({expectation(move)})'
                 settling = min(_SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
                 return self._decide(seen, Action(said, changes, settling=settling), move.cut)
         nothing = 'no cut within the limits is predicted to be stable, and none was left to try'
@@ -396,14 +397,3 @@ def _figures(seen: Seen) -> str:
     ]
     words = [text for value, text in known if math.isfinite(value)]
     return f'Chatter {", ".join(words) or "flagged"}'
-
-
-def _changes(changes: Mapping[str, float], cut: Cut) -> str:
-    return ', '.join(f'{n} from {getattr(cut, n):.6g} to {v:.6g}' for n, v in changes.items())
-
-
-def _expected(move: Move) -> str:
-    margin = '' if math.isnan(move.margin) else f', margin {100.0 * move.margin:.0f} %'
-    kept = f'{100.0 * move.kept:.0f} % of the removal rate'
-    sure = f'on {100.0 * move.share:.0f} % of the machines that this may be'
-    return f'predicted: growth {move.growth_rate:.1f} 1/s{margin}, {kept}; stable {sure}'
