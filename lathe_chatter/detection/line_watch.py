@@ -17,8 +17,9 @@ from lathe_chatter.detection.band_judge import BandJudge
 
 _SHARE, _GONE = 0.55, 0.3
 """Part of all power in the line that makes an alarm, and below which it is over."""
-_UNSTEADY = 0.6
-"""Standard deviation of its power over the mean; 1 for noise in a mode."""
+_UNSTEADY, _SLOW_UNSTEADY, _SLOW = 0.6, 0.35, 250.0
+"""Standard deviation of its power over the mean; 1 for noise in a mode, but less is seen of one
+that swells slowly: below so many Hz more is asked."""
 _QUIET, _FORGETTING = 0.1, 1e-3
 """Part of the loudest that was heard, below which nothing is cut: a hum that is left alone there
 is no chatter; and what of the loudest a look forgets."""
@@ -80,7 +81,8 @@ class LineWatch:
             return
         now, hertz = judge.state.now[0], float(judge.centres[place])
         mean, square = judge.state.line[:, place]
-        steady = square < (1.0 + _UNSTEADY**2) * mean**2
+        unsteady = _UNSTEADY if hertz > _SLOW else _SLOW_UNSTEADY
+        steady = square < (1.0 + unsteady**2) * mean**2
         if not self._is_same(hertz):
             self._found, self._hertz = 0, hertz
         risen = now.score >= self._strictness
