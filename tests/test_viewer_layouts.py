@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from support.browser import Browser, chromium
 
 from lathe_chatter.cli import main as cli
 from lathe_chatter.recording import Run, read_run
@@ -71,6 +73,10 @@ def shown_of(run: Run, topic: str, place: str) -> str:
     return SAMPLE_COLUMNS[int(number[1])] if number else place
 
 
+SCRIPT = '/studio_script/portraits'
+POINT = re.compile(r'(tool|workpiece)\[:\]\.(displacement|velocity)')
+
+
 def foxglove_paths(panel: dict[str, Any]) -> Iterator[str]:
     yield from (path['value'] for path in panel['paths'] if path.get('enabled', True))
     if 'xAxisPath' in panel:
@@ -86,7 +92,11 @@ def test_the_foxglove_layout_shows_what_a_run_has(
     for panel in layout['configById'].values():
         for path in foxglove_paths(panel):
             topic, _, place = path.partition('.')
-            shown.setdefault(topic, set()).add(shown_of(run, topic, place))
+            if topic == SCRIPT and (point := POINT.fullmatch(place)):  # the batches of a topic
+                topic, named = '/lathe/samples', '_'.join(point.groups())
+            else:
+                named = shown_of(run, topic, place)
+            shown.setdefault(topic, set()).add(named)
     assert shown == {**expected, '/chatter_monitor/state': {'data'}}
 
     def leaves(node: Any) -> Iterator[str]:
@@ -96,6 +106,40 @@ def test_the_foxglove_layout_shows_what_a_run_has(
             yield from (leaf for side in ('first', 'second') for leaf in leaves(node[side]))
 
     assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
+
+
+def test_the_script_of_the_live_layout_makes_portraits_of_batches(
+    run: Run, tmp_path: Path
+) -> None:
+    if chromium() is None:
+        pytest.skip('no Chromium is here')
+    layout = json.loads((LAYOUTS / 'foxglove.json').read_text())
+    (script,) = layout['userNodes'].values()
+    assert script['name'] == SCRIPT
+    plain = script['sourceCode']
+    # The types of TypeScript, which a browser does not know.
+    for kind in (r'^import .*$', r'^type .*$', r'\bexport (default )?', r': number\[\](\[\])?',
+                 r': Input<.*?>', r': Portraits \| undefined', r': string'):  # fmt: skip
+        plain = re.sub(kind, '', plain, flags=re.MULTILINE)
+    messages = [each.message for each in islice(run.messages('/lathe/samples'), 100)]
+    events = [
+        {'message': {'layout': {'dim': [{'label': dim.label} for dim in message.layout.dim]},
+                     'data': [float(value) for value in message.data]}}
+        for message in messages
+    ]  # fmt: skip
+    browser = Browser(tmp_path / 'profile')
+    try:
+        made = browser.run(
+            f'(() => {{ {plain}; return {json.dumps(events)}.map(script).filter(Boolean); }})()'
+        )
+    finally:
+        browser.close()
+    assert len(made) == len(events) // 25
+    samples = np.vstack([np.reshape(message.data, (-1, 8)) for message in messages])
+    newest = samples[: len(made) * 25 * len(samples) // len(events)][-1000:]
+    for k, body in ((2, 'tool'), (4, 'workpiece')):
+        found = np.array([[p['displacement'], p['velocity']] for p in made[-1][body]])
+        np.testing.assert_allclose(found, newest[:, k : k + 2] * (1e6, 1e3), rtol=1e-12)
 
 
 def test_the_plotjuggler_layout_shows_what_a_run_has(

@@ -25,7 +25,7 @@ from lathe_chatter.page.server import answers, free_port
 PAGE = 'operator_page'
 TICK = 0.002
 _FRAME = 0.05
-_SETTLING = 5.0
+_SETTLING, _PATIENCE = 5.0, 60.0
 _KEPT = QoSProfile(depth=5000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -58,17 +58,20 @@ class Viewer:
         self._thread.start()
 
     def choose(self) -> None:
-        """Look at the lathe."""
-        for _ in range(100):
+        """Look at the lathe, until its parameters are known."""
+        until = time.monotonic() + _PATIENCE
+        while time.monotonic() < until:
             self.ask(do='choose', lathe='/lathe', id=1)
-            self.ask(do='next')
-            frame = self.socket.recv(timeout=30)
-            length = int.from_bytes(frame[:4], 'little')
-            answers_ = json.loads(frame[4 : 4 + length]).get('answers', [])
-            if any(answer['ok'] for answer in answers_):
-                return
-            time.sleep(0.2)
-        raise RuntimeError('the page has seen no lathe')
+            for _ in range(100):
+                self.ask(do='next')
+                frame = self.socket.recv(timeout=_PATIENCE)
+                header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], 'little')])
+                if 'lathe_values' in header.get('cell', {}):
+                    return
+                if any(not answer['ok'] for answer in header.get('answers', [])):
+                    time.sleep(0.5)
+                    break
+        raise RuntimeError('the page has not seen the lathe')
 
     def ask(self, **wish: Any) -> None:
         """Send a wish."""
@@ -95,7 +98,7 @@ def browser_at(url: str) -> Iterator[Browser]:
         browser = Browser(Path(folder))
         try:
             browser.open(url)
-            browser.until('cell.chart?.speed && frames > 20', 'the page', 120.0)
+            browser.until('cell.chart?.speed && frames > 20', 'the page', 600.0)
             yield browser
         finally:
             browser.close()

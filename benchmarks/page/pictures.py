@@ -24,14 +24,14 @@ def take(folder: Path) -> Iterator[str]:
         page() as (_, url),
         browser_at(url) as browser,
     ):
-        browser.until('document.querySelector("#lamp-word").textContent === "stable"', 'it', 120)
-        browser.until('cell.supervisor_rows', 'the supervisor', 120)
+        browser.until('document.querySelector("#lamp-word").textContent === "stable"', 'it', 600)
+        browser.until('cell.supervisor_rows', 'the supervisor', 600)
         time.sleep(4.0)
         browser.click('#operate')
         browser.until('server.operating', 'the right to act')
         browser.enter('#p-depth_of_cut', str(_DEPTH))
-        browser.until('cell.flag?.up && cell.figures?.recommended_speed_rpm', 'chatter', 120)
-        browser.until('cell.action?.includes("~/accept")', 'the question', 120)
+        browser.until('cell.flag?.up && cell.figures?.recommended_speed_rpm', 'chatter', 600)
+        browser.until('cell.action?.includes("~/accept")', 'the question', 600)
         for name, width, height in (('page', 1440, 1000), ('page_phone', 390, 1400)):
             browser.resize(width, height)
             browser.run('scrollTo(0, 0)')

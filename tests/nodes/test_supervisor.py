@@ -127,8 +127,9 @@ def test_a_killed_supervisor_leaves_the_lathe_as_it_is(cell: Callable[..., Cell]
 
 
 def test_a_silent_monitor_keeps_it_from_acting(cell: Callable[..., Cell]) -> None:
-    there = cell('mode:=act', 'hands_off:=1.5')
+    there = cell('mode:=act', 'hands_off:=60.0')
     there.deepen()
+    there.await_words('somebody else has just changed something')
     there.nodes.kill('/chatter_monitor')
     there.await_words('nothing is done, for nothing comes from the monitor')
     assert there.get('spindle_speed_rpm') == 3000.0

@@ -119,6 +119,10 @@ function takePage(news) {
 
 function choose() {
   forget();
+  // What the one before had, this one may not have, and then says nothing of.
+  makeSupervisor(null);
+  $('log').replaceChildren();
+  for (const id of ['action', 'scenario-text', 'recording', 'health', 'chart-text']) $(id).textContent = '';
   sessionStorage.setItem('lathe', $('lathes').value);
   act({do: 'choose', lathe: $('lathes').value});
 }
