@@ -31,14 +31,10 @@ _EFOLDS = 1.5
 _FALLING, _FALLEN = 0.9, 0.5
 """Part to which vibration falls meanwhile where chatter dies; and of what it was at the move, to
 which it has fallen where it falls no more."""
-_GROWN, _GROWING, _STANDING = 4.0, 2.2, 1.4
+_GROWN, _GROWING, _UNEXPECTED = 4.0, 2.2, 8.0
 """Times the vibration of the quiet cut before, that it has whatever is known of its growth; where
-it is known to grow; and where it does under a flag that stands for _LONG. Else the flag is waited
+it is known to grow; and where most machines that it may be are stable. Else the flag is waited
 on, for noise raises it at times."""
-_LONG = 1.5
-"""s."""
-_UNEXPECTED = 8.0
-"""Times the vibration of the quiet cut where most machines that it may be are stable there."""
 _SURELY = 0.1
 """s that it must have had that, and not fallen: what a change of the cut stirs up falls soon."""
 _LOOKS = 200
@@ -326,14 +322,12 @@ class Supervisor:
         if self._chance is None or self._chance[0] != seen.cut:
             machines = may_be(self.machine, self._machine_error)
             self._chance = seen.cut, chance_of(machines, seen.cut)
-        lasted = seen.time - self._alarm_at
-        if lasted < _SURELY:
+        if seen.time < self._alarm_at + _SURELY:
             # Before it has grown so far that the tool leaves the cut.
             self._fits |= fits(self.machine, seen.cut, seen.frequency, seen.growth_rate)
             return False
         recent = [level for time, level in self._levels if time > seen.time - _SURELY]
-        grows = _STANDING if lasted > _LONG else _GROWING
-        times = grows if seen.growth_rate > 0.0 else _GROWN
+        times = _GROWING if seen.growth_rate > 0.0 else _GROWN
         times = _UNEXPECTED if self._chance[1] > 0.5 else times
         enough = not self._quiet_levels or min(recent) > times * median(self._quiet_levels)
         return enough and seen.amplitude > _FALLING * recent[0]
