@@ -41,6 +41,7 @@ class RemoteParameters:
         self._node = node
         self._on_answer = on_answer
         self._questions: dict[str, _Question] = {}
+        self._done: list[_Question] = []
         self._answered: set[str] = set()
 
     def want(self, namespace: str, node_name: str) -> None:
@@ -67,10 +68,13 @@ class RemoteParameters:
         """Ask those that can answer by now, and have not."""
         for name, question in self._questions.items():
             question.look(partial(self._take, name))
+        for question in [each for each in self._done if each.is_idle()]:
+            self._done.remove(question)
+            question.close()
 
     def _take(self, name: str, values: dict[str, Any]) -> None:
         if (question := self._questions.pop(name, None)) is not None:
-            question.close()
+            self._done.append(question)
             self._answered.add(name)
             self._on_answer(name, values)
 
@@ -84,6 +88,7 @@ class _Question:
         self._get = node.create_client(GetParameters, f'{name}/get_parameters')
         self._list = node.create_client(ListParameters, f'{name}/list_parameters')
         self._due: float | None = None
+        self._open: list[Any] = []
 
     def look(self, on_values: Callable[[dict[str, Any]], None]) -> None:
         """Ask, if it is time to."""
@@ -102,13 +107,24 @@ class _Question:
                 found = map(parameter_value_to_python, future.result().values)
                 on_values(dict(zip(names, found, strict=False)))
 
-            self._get.call_async(GetParameters.Request(names=names)).add_done_callback(got)
+            future = self._get.call_async(GetParameters.Request(names=names))
+            self._open.append(future)
+            future.add_done_callback(got)
 
         if self._names is not None:
             get(self._names)
             return
         listed = self._list.call_async(ListParameters.Request())
+        self._open.append(listed)
         listed.add_done_callback(lambda future: get(list(future.result().result.names)))
+
+    def is_idle(self) -> bool:
+        """Whether every answer has come.
+
+        On a busy machine a node is asked twice, and answers twice: the executor that is driven by
+        events crashes where the client of the second answer went with the first.
+        """
+        return all(future.done() for future in self._open)
 
     def close(self) -> None:
         """Ask no more."""
