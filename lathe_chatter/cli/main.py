@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
@@ -27,9 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, what the verb says (1 for a verdict that is no), 2 for a user's
         mistake, 128 and the number of the signal when interrupted: 130 after Ctrl-C.
     """
-    try:
-        os.getcwd()  # noqa: PTH109 -- pathlib takes time to import
-    except OSError:  # libraries want one as they are imported, and so do relative paths
+    if not _has_working_directory():
         sys.stderr.write('The working directory is not there any more: change to one that is.\n')
         return USER_ERROR
     received: list[int] = []
@@ -49,8 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os._exit(128 + number)
 
     try:
-        for each in heard:
-            signal.signal(each, end)
+        _have_handled(heard, end)
         from lathe_chatter.cli.verbs import BEGINNING, parser
 
         words = sys.argv[1:] if arguments is None else arguments
@@ -61,10 +58,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.verb is None:
             sys.stdout.write(BEGINNING)
             return 0
-        for each in heard:
-            signal.signal(each, interrupt)
+        _have_handled(heard, interrupt)
         code = _carried_out(options)
-    except KeyboardInterrupt:
+    except BaseException as error:
+        # Amid an import an interrupt can come out as another error.
+        if not received and not isinstance(error, KeyboardInterrupt):
+            raise
         code = INTERRUPTED
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -72,6 +71,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for each in heard:
             signal.signal(each, before[each])
     return 128 + received[0] if code == INTERRUPTED and received else code
+
+
+def _has_working_directory() -> bool:
+    """Whether there is one: libraries want it as they are imported, and so do relative paths."""
+    try:
+        os.getcwd()  # noqa: PTH109 -- pathlib takes time to import
+    except OSError:
+        return False
+    return True
+
+
+def _have_handled(numbers: Sequence[int], handler: Callable[[int, Any], None]) -> None:
+    for number in numbers:
+        signal.signal(number, handler)
 
 
 def _carried_out(options: Any) -> int:

@@ -184,6 +184,8 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                     continue  # rclpy's own, and for rclpy to judge
                 return self._table.unknown(name)
             row = self._table[name]
+            if parameter.value is None:  # as of one that is to be deleted
+                return f'{name} cannot be without a value.'
             if not row.run_time:
                 return f'{name} can be given at the start only.'
             try:

@@ -253,3 +253,26 @@ def test_a_misspelt_verb_is_told_the_nearest(capsys: pytest.CaptureFixture[str])
         main(['lobs'])
     assert ended.value.code == 2
     assert 'perhaps lobes' in capsys.readouterr().err
+
+
+IMPORTING = """
+import os, signal, sys
+from lathe_chatter.cli import main
+
+class Name:
+    def __set_name__(self, owner, name):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+def carried_out(options):
+    class Owner:  # as of a library that is imported: Python 3.11 makes a RuntimeError of it
+        name = Name()
+
+main._carried_out = carried_out
+sys.exit(main.main(['bench']))
+"""
+
+
+def test_an_interrupt_amid_an_import_is_no_traceback() -> None:
+    command = [sys.executable, '-c', IMPORTING]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (143, '')

@@ -490,3 +490,12 @@ def test_it_cannot_drive_the_clock_that_it_follows(context: Context) -> None:
     overrides = [Parameter(name, value=True) for name in ('use_sim_time', 'publish_clock')]
     with pytest.raises(ParameterError, match='for /clock has one owner'):
         LatheNode(context=context, parameter_overrides=overrides)
+
+
+def test_a_parameter_cannot_be_deleted(start: Any, bench: Bench) -> None:
+    """As `ros2 param delete` asks, with a value that is none."""
+    start(LatheNode)
+    for name in ('depth_of_cut', 'seed'):
+        (answer,) = bench.set('/lathe', **{name: None})
+        assert not answer.successful
+        assert answer.reason == f'{name} cannot be without a value.'

@@ -178,6 +178,10 @@ SAID = {
             'the parameter exists, and is no run-time one',
             f'{LATHE}::test_a_refused_set_has_a_reason_and_changes_nothing',
         ),
+        '{} cannot be without a value.': (
+            'the parameter was to be deleted, or its type is none that ROS knows',
+            f'{LATHE}::test_a_parameter_cannot_be_deleted',
+        ),
         'true or false': (
             'use_sim_time was given another value',
             f'{MAIN}::test_a_wrong_parameter_at_the_start_is_one_sentence_that_names_it',
