@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
 import sys
@@ -15,6 +16,8 @@ from runs import ARRAY, PER_COMMIT, START, STORE, TICK, blocks, samples_topic, s
 
 from lathe_chatter.recording import RunWriter, read_run
 from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.scenario import Scenario
+from lathe_chatter.scenario.simulation import simulate
 
 
 def writing() -> None:
@@ -101,6 +104,23 @@ def _read_by_others(run: Path) -> None:
             f'{time.perf_counter() - began:.2f} s ({time.process_time() - busy:.2f} s of '
             'processor time)'
         )
+
+
+def report(seconds: float) -> None:
+    """Time and memory of the report of a long run, in a process of its own."""
+    with scratch() as place:
+        simulate(Scenario('long', 'A long run', seconds), place / 'run', monitor=False)
+        verb = [sys.executable, '-m', 'lathe_chatter.cli', 'report', str(place / 'run')]
+        began = time.perf_counter()
+        process = subprocess.Popen(verb, stdout=subprocess.DEVNULL)  # noqa: S603 -- ourselves
+        _, failed, usage = os.wait4(process.pid, 0)  # of this child alone
+        taken = time.perf_counter() - began
+        assert not failed  # noqa: S101 -- or there is no figure
+    busy = usage.ru_utime + usage.ru_stime
+    print(
+        f'report: {seconds:g} s at 10 kHz in {taken:.1f} s ({busy:.1f} s of processor time; goal '
+        f'15 s) with at most {usage.ru_maxrss / 1e6:.2f} GB (goal 0.7)'
+    )
 
 
 def read_here(run: str, columns: str) -> None:
