@@ -227,7 +227,10 @@ def judge(
         if now.by_line != 0 or now.rise != now.rise:
             strongest = loudest
         now.strongest = strongest
-    if phases[PHASE_SEEN].min() >= 1.0:
+    seen = phases[PHASE_SEEN, 0]
+    for j in range(1, phases.shape[1]):
+        seen = min(seen, phases[PHASE_SEEN, j])
+    if seen >= 1.0:
         follow_phase(state, phases)
     wave = (np.nan, np.nan, np.nan)
     if not model or now.rise > ARMED:

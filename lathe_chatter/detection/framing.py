@@ -157,7 +157,7 @@ class Framer:
 
     def _measure(self, rows: Array) -> StreamFormat | None:
         """Sample rate and channels of a stretch; None where it is broken before they are known."""
-        first = rows[:_RATE_SAMPLES, :4]
+        first = np.ascontiguousarray(rows[:_RATE_SAMPLES, :4])  # one kind of array to compile for
         steps = np.diff(first[:, 0])
         steps = steps[np.isfinite(steps)]
         self._step = float(np.median(steps)) if len(steps) else math.nan

@@ -88,7 +88,7 @@ def new_memory(turn: float, kernels: Kernels, stride: int) -> Memory:
     )
 
 
-@compiled(inline=True)
+@compiled(inline=True, inner=True)
 def _interpolated(row: Array, index: int, x: float) -> float:
     """The polynomial through six values, a fraction x beyond `index`."""
     a, b, c, d, e, f = x + 2.0, x + 1.0, x, x - 1.0, x - 2.0, x - 3.0

@@ -20,14 +20,14 @@ ALPHA, BETA, DAMPING, STIFFNESS = range(4)
 SECTION_SIZE = 4
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def inverse(z: complex) -> complex:
     """1/z without a check for 0, which gives infinity."""
     size = z.real * z.real + z.imag * z.imag
     return complex(z.real / size, -z.imag / size)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def newton_step(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, s: complex
 ) -> complex:
@@ -48,7 +48,7 @@ def newton_step(
     return value * inverse(poles * value + rise)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def receptance_at(sections: Array, modes: int, s: complex) -> complex:
     """G(s)."""
     total = 0j

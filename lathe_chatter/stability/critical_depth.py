@@ -90,8 +90,11 @@ def critical_depths(
             continue
         sections = cuts.sections[which, :modes]
         shortest = float(cuts.delay[here].min())
+        grid = frequency_grid(sections, 4.0 * math.pi / shortest)
+        most, real = _bounds(sections, modes, grid)
+        steps = np.argsort(-real)  # by NumPy: Numba's sort takes a second to compile
         _depths(
-            sections, modes, frequency_grid(sections, 4.0 * math.pi / shortest),
+            sections, modes, grid, most, real, steps,
             cuts.stiffness, cuts.damping, cuts.delay, here, depths,
         )  # fmt: skip
     return depths.reshape(cuts.shape)
@@ -130,11 +133,8 @@ def _grid(sections: Array, modes: int, beyond: float) -> Array:
 
 
 @compiled(nogil=True)
-def _depths(
-    sections: Array, modes: int, grid: Array, stiffness: Array, damping: Array, delay: Array,
-    wanted: Integers, depths: Array,
-) -> None:  # fmt: skip
-    """The critical depths of the wanted cuts of one machine."""
+def _bounds(sections: Array, modes: int, grid: Array) -> tuple[Array, Array]:
+    """The largest |G|, and the largest -Re G, that each step of the grid may have."""
     count = len(grid) - 1
     response = np.empty(count + 1, np.complex128)
     for k in range(count + 1):
@@ -144,14 +144,22 @@ def _depths(
         most[k] = _SLACK * max(abs(response[k]), abs(response[k + 1]))
         least = min(response[k].real, response[k + 1].real)
         real[k] = -least + (_SLACK - 1.0) * most[k]
-    order = np.argsort(-real)
+    return most, real
+
+
+@compiled(nogil=True)
+def _depths(
+    sections: Array, modes: int, grid: Array, most: Array, real: Array, order: Integers,
+    stiffness: Array, damping: Array, delay: Array, wanted: Integers, depths: Array,
+) -> None:  # fmt: skip
+    """The critical depths of the wanted cuts of one machine."""
     for cut in wanted:
         depths[cut] = _depth(
             sections, modes, grid, most, real, order, stiffness[cut], damping[cut], delay[cut]
         )
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _depth(
     sections: Array, modes: int, grid: Array, most: Array, real: Array, order: Integers,
     stiffness: float, damping: float, delay: float,
@@ -189,7 +197,7 @@ def _depth(
     return best
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _response(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, omega: float
 ) -> complex:
@@ -199,7 +207,7 @@ def _response(
     return force * receptance_at(sections, modes, s)
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _crossing(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, left: float,
     at_left: complex, right: float, at_right: complex,

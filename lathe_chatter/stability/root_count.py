@@ -99,7 +99,7 @@ def _count_all(
         )  # fmt: skip
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def count_to_the_right(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float
 ) -> int:
@@ -132,7 +132,7 @@ def count_to_the_right(
     return count - round((turned - cmath.phase(here)) / math.pi)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _value(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float,
     omega: float, echo: float,
@@ -154,7 +154,7 @@ def _value(
     return complex(1.0 + a * real - b * imaginary, a * imaginary + b * real)
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _poles_to_the_right(sections: Array, modes: int, sigma: float) -> int:
     """The number of zeros of A with Re s > sigma."""
     count = 0
@@ -166,7 +166,7 @@ def _poles_to_the_right(sections: Array, modes: int, sigma: float) -> int:
     return count
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _last_frequency(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float
 ) -> float:
@@ -194,7 +194,7 @@ def _last_frequency(
     return -1.0
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _excludes_zero(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, sigma: float,
     omega: float, echo: float, half: float,

@@ -205,7 +205,7 @@ def _rightmost_of_all(
         )
 
 
-@compiled()
+@compiled(inner=True)
 def _rightmost(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, proven: bool
 ) -> complex:
@@ -229,7 +229,7 @@ def _rightmost(
     return complex(math.nan, math.nan)
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _rightmost_mode(sections: Array, modes: int) -> complex:
     """The least damped mode of a machine that does not cut."""
     best = _NONE
@@ -240,7 +240,7 @@ def _rightmost_mode(sections: Array, modes: int) -> complex:
     return best
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _pole(sections: Array, j: int) -> complex:
     """The zero of a section's denominator in the upper half plane, or its right one."""
     half = 0.5 * sections[j, DAMPING]
@@ -250,7 +250,7 @@ def _pole(sections: Array, j: int) -> complex:
     return complex(-half, math.sqrt(-rest))
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _highest(sections: Array, modes: int, stiffness: float, damping: float, delay: float) -> float:
     """An angular frequency above which no root is of interest, rad/s."""
     natural, coupled = 0.0, 0.0
@@ -260,7 +260,7 @@ def _highest(sections: Array, modes: int, stiffness: float, damping: float, dela
     return 1.1 * math.sqrt(natural + stiffness * coupled) + damping * coupled + math.pi / delay
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _newton(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, s: complex,
     iterations: int, strip: float,
@@ -279,7 +279,7 @@ def _newton(
     return _NONE
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _quick_search(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float
 ) -> complex:

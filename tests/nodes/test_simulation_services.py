@@ -12,7 +12,10 @@ from support.node_bench import Bench, samples_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
 
-pytest.importorskip('simulation_interfaces', reason='simulation_interfaces is not installed')
+pytest.importorskip(
+    'simulation_interfaces',
+    reason='simulation_interfaces is a package of ROS 2 that the package index has no wheel of',
+)
 
 from simulation_interfaces.msg import Result, SimulationState, SimulatorFeatures
 from simulation_interfaces.srv import (
