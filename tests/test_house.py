@@ -163,8 +163,10 @@ def in_a_fresh_interpreter(script: str, home: Path) -> str:
 
 IMPORT_ALL = """
 import contextlib, importlib, pkgutil, lathe_chatter.errors
+from importlib.util import find_spec
+without = ('__main__',) if find_spec('rclpy') else ('__main__', 'nodes')  # these need ROS
 for found in pkgutil.walk_packages(lathe_chatter.__path__, 'lathe_chatter.'):
-    if not found.name.endswith('__main__'):
+    if not set(found.name.split('.')) & set(without):
         with contextlib.suppress(lathe_chatter.errors.MissingPackageError):  # an extra
             importlib.import_module(found.name)
 import sys

@@ -12,7 +12,7 @@ import os
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -145,7 +145,6 @@ class Screen:
             total: When all is done; None where nobody knows yet.
             unit: Of the total, empty for a count of things.
         """
-        # The library ends a bar with an empty line even where it has shown none.
         shown = self._console.is_terminal
         columns: list[ProgressColumn] = [
             TextColumn('{task.description}', markup=False),
@@ -154,9 +153,9 @@ class Screen:
         ]
         if self._console.width >= _NARROW:
             columns += [TimeElapsedColumn(), TimeRemainingColumn()]
-        with Progress(
-            *columns, console=self._console, transient=True, disable=not shown
-        ) as progress:
+        progress = Progress(*columns, console=self._console, transient=True, disable=not shown)
+        # The library ends a bar with an empty line even where it has shown none.
+        with progress if shown else nullcontext():
             yield Bar(progress, what, total)
 
 
