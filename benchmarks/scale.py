@@ -5,7 +5,7 @@
 Parts: truth windows hashes workers environment size (all of these by default; some three minutes
 on two idle cores) and picture. Where others use the machine the time on its clock says little:
 processor time stands beside it, and the load at the beginning. `picture` draws how time falls with
-workers that have a core each. Measured is, of 1 to 8 of them, the processor time of the busiest
+workers that have a core each. Measured is, of 1 to 4 of them, the processor time of the busiest
 process; beyond that it is simulated, from the processor time of each batch and of what the one
 process that writes does.
 """
@@ -46,8 +46,8 @@ from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.stability.operating_points import operating_points
 
 ROOT = Path(__file__).resolve().parents[1]
-MEASURED = (1, 2, 4, 8)
-"""Workers of which the picture has measured values."""
+MEASURED, PICTURED = (1, 2, 4), 16_000
+"""Workers of which the picture has measured values, and windows of which they are."""
 _PER_MACHINE = 1000
 """Windows of a machine: ten runs of a hundred."""
 _PLAN = """
@@ -340,7 +340,7 @@ def picture(options: Any) -> None:
     from lathe_chatter.plot_style import OPEN, SEATED, grid, new_figure, save
 
     with tempfile.TemporaryDirectory() as name:
-        plan = plan_of(40_000, Path(name))
+        plan = plan_of(PICTURED, Path(name))
         parts, lengths, serial = making.parts_of(plan), [], 0.0
         making.make_part(plan, next(iter(parts.items())))
         for part in parts.items():
@@ -371,7 +371,7 @@ def picture(options: Any) -> None:
     axes.loglog(counts, times[0] / 60.0 / counts, ':', color='0.5', label='ideal')
     axes.loglog(
         [*measured], [scale * value for value in measured.values()], 'o', color=SEATED, ms=8,
-        label='measured on 40 000 windows: the busiest process',
+        label='measured on 16 000 windows: the busiest process',
     )  # fmt: skip
     axes.set_xlabel('workers')
     axes.set_ylabel('time of a million windows, a core each / min')
