@@ -87,10 +87,10 @@ def _compared(case: Case, python: Path) -> list[Line]:
         Figure('   its error / local amplitude', ours),
         Figure(
             '   times cheaper than jitcdde', peer.cpu / (mine / DURATION),
-            goal=400.0, at_least=True, note='medians of CPU time',
+            goal=1300.0, at_least=True, note='medians of CPU time',
         ),
         Figure(
-            '   times more accurate than jitcdde', peer.error / ours, goal=1000.0, at_least=True
+            '   times more accurate than jitcdde', peer.error / ours, goal=5000.0, at_least=True
         ),
     ]  # fmt: skip
 

@@ -1,16 +1,19 @@
-"""What a step costs."""
+"""What a step costs, beside the least that it does in C."""
 
 from __future__ import annotations
 
-import statistics
 import time
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from statistics import median
 
-from cases import CHATTER, DURATION, LINEAR, RATE, TOUCHING, Case
-from figures import Figure, Line, tracked
+from cases import DURATION, RATE, Case
+from figures import Figure, Line, Missing, tracked
+from floor import Floor, NoCompilerError
 
+from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.model import Cut, Machine
 
 _REPEATS = 200
 _SETTLED = 2.0
@@ -44,45 +47,96 @@ def cost(case: Case, settled: float = 0.0, repeats: int = _REPEATS) -> Cost:
 
 
 def speed() -> list[Line]:
-    """Nanoseconds a step, and how much faster than time itself."""
-    uneven = LINEAR.with_changes(spindle_speed_rpm=3001.7)
-    varied = LINEAR.with_changes(speed_variation_amplitude=0.2)
-    lines: list[Line] = []
-    free = (
-        ('without contact', LINEAR),
-        ('without contact, 10000 rev/min', LINEAR.with_changes(spindle_speed_rpm=1e4)),
-        ('without contact, 3001.7 rev/min', uneven),
-    )
-    for what, case in tracked(free, 'steps without contact'):
-        lines += _lines(what, cost(case), 30.0, 3000.0)
-    touching = (
-        ('with contact, gap 60 um, linear', TOUCHING.with_changes(bearing_clearance=6e-5), 0.0),
-        ('with contact, gap 5 um, linear', TOUCHING, 0.0),
-        ('out of cut, none, total', replace(LINEAR, total_force=True), _SETTLED),
-        ('contact and out of cut, gap 5 um, total', CHATTER, _SETTLED),
-    )
-    for what, case, settled in tracked(touching, 'steps with contact'):
-        lines += _lines(what, cost(case, settled), 60.0)
-    lines += _lines('without contact, speed varied', cost(varied))
-    return lines
+    """Nanoseconds a step by what happens in it, medians, in turns with the C loop's."""
+    runs = {name: _Run(*given) for name, given in _cases().items()}
+    try:
+        floor: Floor | None = Floor()
+        reason = ''
+    except NoCompilerError as problem:
+        floor, reason = None, str(problem)
+    least = []
+    for _ in tracked(range(_TURNS), 'steps of all kinds, in turns'):
+        for run in runs.values():
+            run.once()
+        if floor is not None:
+            least.append(floor.nanoseconds(1))
+    lines: list[Line] = [
+        Missing('the least that a quiet step costs in C', reason)
+        if floor is None
+        else Figure('the least that a quiet step costs in C, one by one', median(least), 'ns')
+    ]
+    for name, run in runs.items():
+        note = f'best {min(run.costs):.1f}; {run.events} events in 10,000 steps'
+        lines.append(Figure(f'step, {name}', median(run.costs), 'ns', run.goal, note=note))
+    return [*lines, _tick()]
 
 
-def _lines(
-    what: str, found: Cost, goal: float | None = None, factor_goal: float | None = None
-) -> list[Line]:
-    per_step = 1e9 / found.steps
-    note = (
-        f'CPU median {per_step * statistics.median(found.cpu):.1f}; '
-        f'clock best {per_step * min(found.wall):.1f}, '
-        f'median {per_step * statistics.median(found.wall):.1f}'
+_TURNS = 41
+_SAMPLES = 10_000
+_QUIET = Cut(3000.0, 4e-4, 5e-5)
+_CHATTER = Cut(3000.0, 1e-3, 5e-6)
+
+
+def _split(parts: int) -> Machine:
+    """The paper's machine, each mode in so many equal ones: the same motion."""
+    usual = Machine()
+    tool, work = usual.tool.modes[0], usual.workpiece.modes[0]
+    return Machine(
+        [replace(tool, mass=tool.mass * parts)] * parts,
+        [replace(work, mass=work.mass * parts)] * parts,
+        bearing_stiffness=usual.bearing_stiffness,
     )
-    return [
-        Figure(
-            f'step, {what}: best of {_REPEATS}', per_step * min(found.cpu), 'ns', goal, note=note
-        ),
-        Figure(
-            '   simulated seconds per second', DURATION / min(found.wall),
-            goal=factor_goal, at_least=True,
-            note=f'median {DURATION / statistics.median(found.wall):.0f}',
-        ),
-    ]  # fmt: skip
+
+
+def _cases() -> dict[str, tuple[Machine, Cut, float]]:
+    """Machine, cut and goal, ns, of each line."""
+    one, odd = Machine(), {'spindle_speed_rpm': 3001.7}
+    varied = {'speed_variation_amplitude': 0.1, 'speed_variation_frequency': 2.0}
+    force, sensor = {'force_noise': 1e-3}, {'sensor_noise': 1e-7}
+    return {
+        'quiet, whole turns': (one, _QUIET, 13.0),
+        'quiet, any speed': (one, _QUIET.with_changes(**odd), 25.0),
+        'quiet, 2+2 modes': (_split(2), _QUIET, 22.0),
+        'quiet, 4+4 modes': (_split(4), _QUIET, 40.0),
+        'quiet, 8+8 modes': (_split(8), _QUIET, 80.0),
+        'chatter with contact and loss of cut': (one, _CHATTER, 45.0),
+        'the same at any speed': (one, _CHATTER.with_changes(**odd), 45.0),
+        'sensor noise': (one, _QUIET.with_changes(**sensor), 35.0),
+        'force noise': (one, _QUIET.with_changes(**force), 80.0),
+        'force noise, any speed': (one, _QUIET.with_changes(**force, **odd), 80.0),
+        'speed variation': (one, _QUIET.with_changes(**varied), 60.0),
+        'all three in chatter': (one, _CHATTER.with_changes(**varied, **force, **sensor), 150.0),
+    }
+
+
+class _Run:
+    """The same second of cutting again and again."""
+
+    def __init__(self, machine: Machine, cut: Cut, goal: float) -> None:
+        """Cut until it is as it stays."""
+        self.goal, self.costs, self.events = goal, list[float](), 0
+        self._lathe = VirtualLathe(machine, cut)
+        self._lathe.advance(round(_SETTLED * RATE))
+        self._begin = self._lathe.snapshot()
+
+    def once(self) -> None:
+        """Add the CPU time of a step."""
+        self._lathe.restore(self._begin)
+        then = time.thread_time()
+        self._lathe.advance(_SAMPLES)
+        self.costs.append(1e9 * (time.thread_time() - then) / _SAMPLES)
+        self.events = len(self._lathe.events)
+
+
+def _tick() -> Line:
+    """What a node pays for a tick."""
+    lathe, costs = VirtualLathe(), []
+    for _ in range(201):
+        then = time.thread_time()
+        for _ in range(100):
+            lathe.advance(20)
+        costs.append(1e6 * (time.thread_time() - then) / 100)
+    return Figure(
+        'a tick of 20 samples, called from Python', median(costs), 'us', 3.0,
+        note=f'best {min(costs):.2f}',
+    )  # fmt: skip
