@@ -66,6 +66,10 @@ def configure(parser: ArgumentParser) -> None:
     )  # fmt: skip
 
 
+_FEW = 25
+"""Points of a map that shows no shape."""
+
+
 def run(options: Namespace) -> int:
     """Compute, or continue, and draw."""
     from lathe_chatter.report.knock_map import draw_knock_map
@@ -84,6 +88,12 @@ def run(options: Namespace) -> int:
     if not options.output.exists():  # else they are pictures of it
         keep_existing(*files, force=options.force)
     screen = Screen(json=options.json)
+    points = len(speeds) * len(depths) * len(clearances)
+    if 1 < points < _FEW:
+        screen.say(
+            f'A map of {points} points shows no shape: give axes more values, as '
+            '--speeds 2000:6000:15 --depths 0.0004:0.0008:9.'
+        )
     screen.compile()
     try:
         with executor_of(options, screen) as executor, screen.progress('points') as bar:

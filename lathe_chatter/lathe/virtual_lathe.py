@@ -10,6 +10,7 @@ import numpy as np
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import ParameterError, StateError
+from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import stepper, surface
 from lathe_chatter.lathe.state import LatheState, differences
@@ -163,6 +164,11 @@ class VirtualLathe:
     def guard(self) -> str:
         """Why the run has ended, as a sentence; empty while it goes on."""
         return self._state.guard
+
+    @property
+    def doubts(self) -> list[str]:
+        """Why its samples may not be what was meant, in sentences, see doubts.py."""
+        return doubts(self.setup, self.cut)
 
     @property
     def events(self) -> list[Event]:

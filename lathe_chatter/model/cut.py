@@ -63,7 +63,8 @@ class Cut:
         high=10.0,
     )
     force_noise: float = quantity(
-        'random force on the tool: its mean over T s has the variance force_noise^2/T',
+        'random force on the tool, two-sided: its mean over T s has the variance force_noise^2/T, '
+        'and a spectrum of positive frequencies alone shows sqrt(2) times it',
         'N/sqrt(Hz)',
         default=0.0,
         high=1e3,

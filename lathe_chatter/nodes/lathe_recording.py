@@ -11,12 +11,14 @@ from rclpy.node import Node
 
 from lathe_chatter.arrays import Array
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.cut_events import (
     BEGINNING,
     BEGINNING_AGAIN,
     change_sentence,
     knock_sentence,
 )
+from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model import Cut
 from lathe_chatter.nodes.bounded_log import QuickLog
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
@@ -51,6 +53,9 @@ class LatheRecord:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             node.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
         self._log(BEGINNING)
+        config = recorded_config(values)
+        self._setup, self._doubts = config.setup, list[str]()
+        self._doubt(config.cut)
 
     def write(self, samples: Array) -> None:
         """Write the samples of a tick (n, 8)."""
@@ -63,6 +68,7 @@ class LatheRecord:
     def changed(self, time: float, old: Cut, new: Cut) -> None:
         """The cut was changed at a simulated time, s."""
         self._log(change_sentence(time, old, new))
+        self._doubt(new)
 
     def knocked(self, time: float, impulse: float) -> None:
         """The tool was hit with an impulse, N s."""
@@ -89,6 +95,13 @@ class LatheRecord:
             except OSError as error:
                 self._fail(error)
             self._run = None
+
+    def _doubt(self, cut: Cut) -> None:
+        """Say why the samples may not be what was meant; each sentence once."""
+        for sentence in doubts(self._setup, cut):
+            if sentence not in self._doubts:
+                self._doubts.append(sentence)
+                self._logger.warning(sentence)
 
     def _log(self, sentence: str) -> None:
         if sentence:

@@ -53,6 +53,7 @@ RECOVERED = 'lathe_chatter/recovered'
 _CORE = (
     'arrays.py',
     'compiled.py',
+    'lathe/doubts.py',
     'lathe/integrator/*.py',
     'lathe/state.py',
     'lathe/virtual_lathe.py',

@@ -87,6 +87,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
         simulation = _Simulation(lathe, run, scenario, knocks, tell)
         if monitor:
             simulation.watch(_detector_for(config, scenario))
+        simulation.tell_doubts()
         while simulation.play_block():
             progress(lathe.time)
     said = simulation.player.said
@@ -128,6 +129,7 @@ class _Simulation:
         self._estimate = Estimate()
         self._next_report = 0.0
         self._flag, self._state = False, ''
+        self._doubts: list[str] = []
         self._told_advice = Advice()
 
     def watch(self, detector: ChatterDetector) -> None:
@@ -167,6 +169,13 @@ class _Simulation:
 
     # -- acting ----------------------------------------------------------------------------
 
+    def tell_doubts(self) -> None:
+        """Why the samples may not be what was meant; each sentence once."""
+        for sentence in self._lathe.doubts:
+            if sentence not in self._doubts:
+                self._doubts.append(sentence)
+                self._log(self._lathe.time, sentence)
+
     def _due(self) -> Step | None:
         """The next step, if its time is nearer to this sample than to the next."""
         time = self._lathe.time + 0.5 / self._lathe.sample_rate
@@ -180,6 +189,7 @@ class _Simulation:
         if sentence:
             self._run.log(sentence)
         self._log(self._lathe.time, str(replace(step, changes=meant)))
+        self.tell_doubts()
 
     def _knock(self, impulse: float) -> None:
         self._run.log(knock_sentence(self._lathe.time, impulse))

@@ -79,11 +79,12 @@ def test_the_safe_region_is_the_union_of_depths_that_are_stable_from_zero_on() -
     assert kinds == {0, 1, 2}
 
 
+@pytest.mark.parametrize('contact', [BearingContact.GAP, BearingContact.BOTH_SIDES])
 @pytest.mark.parametrize(('depth', 'lasts'), [(5.7e-4, False), (6.4e-4, True)])
 def test_the_virtual_lathe_chatters_past_the_seating_line_though_below_the_open_limit(
-    depth: float, *, lasts: bool
+    depth: float, contact: BearingContact, *, lasts: bool
 ) -> None:
-    cut = Cut(3000.0, depth, 5e-6, BearingContact.GAP, 0.0025)
+    cut = Cut(3000.0, depth, 5e-6, contact, 0.0025)
     assert contact_at(Machine(), cut).stable is not lasts
     assert depth < critical_depth(Machine(), 3000.0, seated=False)
     lathe = VirtualLathe(Machine(), cut, initial_state=np.array([0.0, 0.0025, 0.0, 0.0]))
