@@ -207,7 +207,7 @@ def _lost(run: Path, nodes: Nodes) -> int:
         return 0
     found = verify(run)
     opened = read_run(run)
-    if '/lathe/samples' not in set(opened.topics):
+    if '/lathe/samples' not in found.last:  # it ended before the first came
         return 0
     times = opened.samples(columns=['time']).columns['time']
     steps = np.rint(np.diff(times) * 1e4).astype(int)
