@@ -20,6 +20,7 @@ def test_every_module_that_it_names_is_there() -> None:
 
 
 def test_equations_are_numbered_in_order_and_what_is_referred_to_is_one() -> None:
+    assert not re.findall(r'^%.*', METHOD, re.MULTILINE), 'that line would be a comment'
     numbers = [int(number) for number in re.findall(r'\\tag\{M(\d+)\}', METHOD)]
     assert numbers == [*range(1, len(numbers) + 1)]
     pages = (path.read_text(encoding='utf-8') for path in EXPLANATION.glob('*.md'))
