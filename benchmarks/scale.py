@@ -35,15 +35,15 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.cli.console import Screen
-from lathe_chatter.cli.executor_options import open_executor
-from lathe_chatter.dataset import Plan, load_plan, make_dataset, making
+from lathe_chatter.cli.worker_options import open_executor
+from lathe_chatter.dataset import Plan, generation, load_plan, make_dataset
 from lathe_chatter.executors import Processes, cores, run_batches
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.sweep import LatheSweep
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.stability.operating_points import operating_points
+from lathe_chatter.stability.batch_roots import operating_points
 
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED, PICTURED = (1, 2, 4), 16_000
@@ -183,7 +183,7 @@ def _who_and_how_long(_item: int) -> tuple[int, float]:
 def warm(plan: Plan, pool: Executor) -> None:
     """Have the workers load what they load once."""
     one = [('', range(1))]
-    list(run_batches(partial(making.make_part, plan), [one] * (2 * cores()), executor=pool))
+    list(run_batches(partial(generation.make_part, plan), [one] * (2 * cores()), executor=pool))
 
 
 def digest(folder: Path) -> str:
@@ -282,7 +282,7 @@ def workers(options: Any) -> None:
 
 def environment(_options: Any) -> None:
     """Steps of 20 ms, where the setting is held and where it is another each time."""
-    from lathe_chatter.environment import LatheEnv
+    from lathe_chatter.gym_environment import LatheEnv
 
     env = LatheEnv(steps=10**9)
     for what, count, moves in (
@@ -345,14 +345,14 @@ def picture(options: Any) -> None:
 
     with tempfile.TemporaryDirectory() as name:
         plan = plan_of(PICTURED, Path(name))
-        parts, lengths, serial = making.parts_of(plan), [], 0.0
-        making.make_part(plan, next(iter(parts.items())))
+        parts, lengths, serial = generation.parts_of(plan), [], 0.0
+        generation.make_part(plan, next(iter(parts.items())))
         for part in parts.items():
             begin = processor_time()
-            files, entry = making.make_part(plan, part)
+            files, entry = generation.make_part(plan, part)
             lengths.append(processor_time() - begin)
             begin = processor_time()
-            making._write(Path(name) / entry['part'], files)  # noqa: SLF001 -- what it takes
+            generation._write(Path(name) / entry['part'], files)  # noqa: SLF001 -- what it takes
             pickle.loads(pickle.dumps((files, entry)))  # noqa: S301 -- as it comes from a worker
             serial += (processor_time() - begin) / len(parts)
         measured = {}

@@ -16,7 +16,7 @@ import numpy as np
 from numba.core import event
 
 from lathe_chatter.detection import ChatterDetector
-from lathe_chatter.detection.identification import cutting_limit, mechanics_of
+from lathe_chatter.detection.cut_identification import cutting_limit, mechanics_of
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter import executors
-from lathe_chatter.cli.executor_options import open_executor
+from lathe_chatter.cli.worker_options import open_executor
 from lathe_chatter.errors import ParameterError, WorkerError
 from lathe_chatter.executors import Processes, run_batches, spread, width_of
 from lathe_chatter.lathe import VirtualLathe

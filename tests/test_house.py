@@ -23,8 +23,8 @@ PACKAGE = ROOT / 'lathe_chatter'
 LONGEST = 400
 
 BASE = {
-    *('arrays', 'code_identity', 'compiled', 'errors', 'executors', 'html_table', 'plot_style'),
-    'result_file',
+    *('array_types', 'fingerprint', 'compiled', 'errors', 'executors', 'html_table', 'plot_style'),
+    'resumable_results',
 }
 """What everybody may use: they use nothing but each other."""
 ARROWS = {
@@ -41,7 +41,7 @@ ARROWS = {
     'scenario': {'model', 'lathe', 'detection', 'recording'},
     'listening': {'detection', 'recording'},
     'dataset': {'model', 'samples', 'lathe', 'stability', 'scenario'},
-    'environment': {'model', 'samples', 'lathe', 'detection'},
+    'gym_environment': {'model', 'samples', 'lathe', 'detection'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
     'page': {'model', 'samples', 'lathe', 'stability', 'recording', 'report'},

@@ -32,7 +32,7 @@ from recordings import recordings
 from scenarios import NOISES
 
 from lathe_chatter.cli.console import Screen
-from lathe_chatter.cli.executor_options import add_executor, executor_of
+from lathe_chatter.cli.worker_options import add_executor, executor_of
 
 PARTS: dict[str, Callable[[Any], list[str]]] = {
     'check': check,

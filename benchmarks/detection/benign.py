@@ -17,7 +17,7 @@ from rivals import HOP, RIVALS
 from scenarios import MACHINE, NOISES, STATES, Case
 from simulator import COLUMNS, RATE, Stretch, Surroundings, simulate
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.executors import spread
 from lathe_chatter.stability import rightmost_root

@@ -11,7 +11,7 @@ from scenarios import MACHINE, Case
 from scipy.stats import beta, chi2
 from simulator import RATE
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.stability import rightmost_root
 
 DEAD = 1.0

@@ -23,7 +23,7 @@ from rivals import HOP, RIVALS
 from scenarios import MACHINE
 from simulator import RATE
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.plot_style import NEUTRAL, SAFE, TOOL, WORKPIECE
 from lathe_chatter.stability import rightmost_root
 

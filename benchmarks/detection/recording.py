@@ -14,7 +14,7 @@ from rivals import HOP, RIVALS
 from scenarios import Case
 from simulator import COLUMNS, RATE, simulate
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.executors import spread
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.executors import spread
 from lathe_chatter.listening import Score, Signals, judge, read_signals

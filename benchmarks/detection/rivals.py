@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from simulator import RATE
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 
 HOP = 100
 """Samples from one value to the next."""

@@ -13,7 +13,7 @@ from delays import quantiles
 from scenarios import MACHINE, NOISES, STATES
 from simulator import ACCELERATIONS, COLUMNS, Stretch, Surroundings, simulate
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.executors import spread

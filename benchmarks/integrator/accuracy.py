@@ -9,7 +9,7 @@ from cases import CHATTER, DURATION, LINEAR, PAPER, RATE, Case, error, exact, lo
 from figures import Figure, Line, tracked
 from support.reference.solution import event_error, relative_error
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import Event
 
 _RAMP = 3e4  # rev/min per s

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import constants_of
 from lathe_chatter.model import Cut, Machine

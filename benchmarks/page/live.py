@@ -19,7 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from support.browser import Browser
 from websockets.sync.client import connect
 
-from lathe_chatter.lathe.cut_events import parse_change
+from lathe_chatter.lathe.cut_event_sentences import parse_change
 from lathe_chatter.page.server import answers, free_port
 
 PAGE = 'operator_page'

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.recording import Topic
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

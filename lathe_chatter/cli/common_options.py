@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model.units import number_in
+from lathe_chatter.model.values_with_units import number_in
 
 PICTURES = ('.png', '.svg', '.pdf')
 """Endings of pictures; beside a PNG there is an SVG."""

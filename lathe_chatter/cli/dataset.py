@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from lathe_chatter.cli.common_options import add_json, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
-from lathe_chatter.cli.executor_options import add_executor, executor_of
+from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.dataset import Plan, load_plan, make_dataset
-from lathe_chatter.dataset.making import make_part, parts_of
+from lathe_chatter.dataset.generation import make_part, parts_of
 from lathe_chatter.errors import DatasetError
 from lathe_chatter.executors import cores, width_of
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from lathe_chatter.cli.common_options import add_force, add_json, in_unit
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
-from lathe_chatter.cli.executor_options import add_executor, executor_of
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
+from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
 from lathe_chatter.knocks.knock_map import Point

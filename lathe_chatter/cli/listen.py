@@ -11,7 +11,7 @@ from lathe_chatter.cli.common_options import add_force, add_json, in_unit, pictu
 from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.filters import UNKNOWN_MACHINE
-from lathe_chatter.detection.motion_filter import sensors_among
+from lathe_chatter.detection.sensors_to_displacement import sensors_among
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import Judged, Score, judge, read_signals, score
 from lathe_chatter.listening.judging import read_labels

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.cli.common_options import (
     add_force,
     add_json,
@@ -19,8 +19,8 @@ from lathe_chatter.cli.common_options import (
     picture_file,
 )
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
-from lathe_chatter.cli.executor_options import add_executor, executor_of
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
+from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact, Cut

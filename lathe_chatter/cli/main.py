@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
-from lathe_chatter.nodes.deferred_signals import raise_lost_interrupts_again
+from lathe_chatter.nodes.end_signals import raise_lost_interrupts_again
 
 USER_ERROR = 2
 INTERRUPTED = 130

@@ -10,14 +10,14 @@ from typing import Any
 
 from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen, writing
-from lathe_chatter.lathe.cut_events import on_the_shop_floor
+from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.plot_style import text_of
 from lathe_chatter.report.operating_points import probabilities_of
 from lathe_chatter.report.probability_chart import cut_probability, probability_sentence
+from lathe_chatter.report.run_excerpts import Excerpt, excerpts_of
+from lathe_chatter.report.run_figure import draw_run
 from lathe_chatter.report.run_history import History, read_history
-from lathe_chatter.report.run_report import draw_run
-from lathe_chatter.report.signal_views import Excerpt, excerpts_of
 from lathe_chatter.stability import root_of
 
 EXAMPLE = 'lathe-chatter report runs/20260401-120000'

@@ -14,9 +14,9 @@ from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_options import scenario_help, verdict
 from lathe_chatter.errors import RunFailedError, RunReadError
+from lathe_chatter.model.lathe_parameters import MACHINE_FILE
 from lathe_chatter.model.machine_file import load_machine
-from lathe_chatter.model.parameters import MACHINE_FILE
-from lathe_chatter.nodes.deferred_signals import DeferredSignals
+from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.entry_points import no_ros
 from lathe_chatter.recording import read_run
 from lathe_chatter.report.run_history import read_history

@@ -13,10 +13,10 @@ from lathe_chatter.cli.parameter_options import add_parameter_options, given_par
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_options import scenario_help, verdict
 from lathe_chatter.errors import ParameterError, ScenarioError
-from lathe_chatter.lathe.cut_events import Knock
+from lathe_chatter.lathe.cut_event_sentences import Knock
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.model.units import number_in
+from lathe_chatter.model.values_with_units import number_in
 from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (
     CLEARED,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lathe_chatter.dataset.making import make_dataset, read_windows
+from lathe_chatter.dataset.generation import make_dataset, read_windows
 from lathe_chatter.dataset.plan import Plan, load_plan
 
 __all__ = ['Plan', 'load_plan', 'make_dataset', 'read_windows']

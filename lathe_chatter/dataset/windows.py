@@ -8,14 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from lathe_chatter.arrays import Array
-from lathe_chatter.dataset.drawing import DrawnRun, drawn_run
+from lathe_chatter.array_types import Array
 from lathe_chatter.dataset.plan import Plan
+from lathe_chatter.dataset.random_draws import DrawnRun, drawn_run
 from lathe_chatter.lathe import EventKind
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.samples import sample_columns
+from lathe_chatter.stability.batch_roots import operating_points
 from lathe_chatter.stability.characteristic import Complex
-from lathe_chatter.stability.operating_points import operating_points
 
 PLACE = ('machine', 'run', 'seed', 'start')
 TRUTH = (

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection.block_loop import take_hops
+from lathe_chatter.detection.cut_identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
 from lathe_chatter.detection.detector_state import (
     CHATTER,
     HOPS,
@@ -18,12 +19,11 @@ from lathe_chatter.detection.detector_state import (
     new_state,
 )
 from lathe_chatter.detection.filters import Band, design, gain, pace_of, thinning_of
-from lathe_chatter.detection.framing import StreamFormat
-from lathe_chatter.detection.identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
-from lathe_chatter.detection.machine_fit import MachineFit, Verdict
-from lathe_chatter.detection.records import record
-from lathe_chatter.detection.signals import HOP_SUMS, SETTINGS, new_memory
+from lathe_chatter.detection.hops import StreamFormat
+from lathe_chatter.detection.machine_check import MachineFit, Verdict
+from lathe_chatter.detection.signal_conditioning import HOP_SUMS, SETTINGS, new_memory
 from lathe_chatter.detection.speed_advice import Identified, SpeedAdviser
+from lathe_chatter.detection.structured_arrays import record
 from lathe_chatter.model import Machine
 
 _PAPER = Machine()

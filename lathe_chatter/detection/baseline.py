@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.detector_state import (
     BLOCK_COUNT,
@@ -20,13 +20,13 @@ from lathe_chatter.detection.detector_state import (
     LAG,
     DetectorState,
 )
-from lathe_chatter.detection.records import Records
-from lathe_chatter.detection.signals import (
+from lathe_chatter.detection.signal_conditioning import (
     PHASE_MEAN,
     PHASE_SEEN,
     PHASE_VARIANCE,
     PHASES,
 )
+from lathe_chatter.detection.structured_arrays import Records
 
 _BLOCK, _FEWEST = 10, 10
 """Hops in a block of the baseline, and the fewest blocks that make one."""

@@ -6,20 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.decision import judge
-from lathe_chatter.detection.detector_state import CHATTER, HOPS, IDLE, WINDOWS, DetectorState
-from lathe_chatter.detection.filters import Kernels
-from lathe_chatter.detection.identification import (
+from lathe_chatter.detection.cut_identification import (
     forget,
     identify,
     noise_sums,
     rightmost_in_band,
 )
-from lathe_chatter.detection.machine_fit import take_hop
-from lathe_chatter.detection.records import Records
-from lathe_chatter.detection.signals import Memory, follow
+from lathe_chatter.detection.decision import judge
+from lathe_chatter.detection.detector_state import CHATTER, HOPS, IDLE, WINDOWS, DetectorState
+from lathe_chatter.detection.filters import Kernels
+from lathe_chatter.detection.machine_check import take_hop
+from lathe_chatter.detection.signal_conditioning import Memory, follow
+from lathe_chatter.detection.structured_arrays import Records
 
 _REFERENCE = 3
 _STANDING = 20

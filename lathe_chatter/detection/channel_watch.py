@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.records import Records, record_type
+from lathe_chatter.detection.structured_arrays import Records, record_type
 
 _CHANNEL = record_type(
     'value pace slow_pace smallest_step entry_step run_since high low bad_at rail_at',

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.baseline import (
     ARMED,
@@ -29,11 +29,11 @@ from lathe_chatter.detection.baseline import (
     growth_by_energy,
     restart_baseline,
 )
+from lathe_chatter.detection.best_window import is_cutting, state_of, write_figures
 from lathe_chatter.detection.detector_state import HOPS, WINDOWS, DetectorState
-from lathe_chatter.detection.estimate_output import is_cutting, state_of, write_figures
 from lathe_chatter.detection.filters import Complex
-from lathe_chatter.detection.records import Records
-from lathe_chatter.detection.signals import PHASE_SEEN
+from lathe_chatter.detection.signal_conditioning import PHASE_SEEN
+from lathe_chatter.detection.structured_arrays import Records
 
 LIMITS = np.array([10.0, 7.2, 6.1, 5.5, 5.1, 4.7])
 """Growth rate over its standard error that is an alarm by itself, in each window."""

@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection.band_judge import BandJudge, Thresholds
 from lathe_chatter.detection.detector_state import UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filters import HIGHEST_SEEN, UNKNOWN_MACHINE, Band, band_of, bands_of
-from lathe_chatter.detection.framing import Discontinuity, Framer, HopBlock, StreamFormat
+from lathe_chatter.detection.hops import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.line_watch import LineWatch
-from lathe_chatter.detection.records import values_of
 from lathe_chatter.detection.speed_advice import SpeedAdviser
+from lathe_chatter.detection.structured_arrays import values_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.machine import Structure

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection.filters import Complex
-from lathe_chatter.detection.records import Records, record, record_type
+from lathe_chatter.detection.structured_arrays import Records, record, record_type
 
 HOPS = 64
 """Hops that are remembered one by one."""

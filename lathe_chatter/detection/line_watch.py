@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection.band_judge import BandJudge
 
 _SHARE, _GONE = 0.55, 0.3

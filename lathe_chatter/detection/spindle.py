@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 
 _CORRECTED, _FOLLOWED = 0.25, 0.03
 """Part of a pulse's offset by which the angle is corrected, and the speed follows: a pulse is seen

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from lathe_chatter.knocks.knock_map import KnockGrid, KnockMap, read_knock_map, run_knock_map
 from lathe_chatter.knocks.knock_outcome import Outcome, follow_knock, linear_reach, resting_state
-from lathe_chatter.knocks.threshold import KnockLimit, Margin, smallest_lasting_knock
+from lathe_chatter.knocks.knock_threshold import KnockLimit, Margin, smallest_lasting_knock
 
 __all__ = [
     'KnockGrid',

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine

@@ -9,9 +9,7 @@ from typing import Any
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_setup import LatheSetup
-from lathe_chatter.model.machine_file import MachineDescription
-from lathe_chatter.model.parameters import (
+from lathe_chatter.model.lathe_parameters import (
     LATHE,
     MACHINE_FILE,
     cut_from,
@@ -19,6 +17,8 @@ from lathe_chatter.model.parameters import (
     parameters_of,
     setup_from,
 )
+from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_file import MachineDescription
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.lathe.integrator.coefficients import Constants, constants_of, steps_per_sample
-from lathe_chatter.lathe.integrator.eigenbasis import product
+from lathe_chatter.lathe.integrator.eigenvectors import product
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
 from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.quantities import Quantity

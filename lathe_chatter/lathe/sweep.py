@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import spread
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe

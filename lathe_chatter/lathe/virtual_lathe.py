@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.lathe.integrator import state_layout as layout

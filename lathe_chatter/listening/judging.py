@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.errors import SignalFileError, reason_of
 from lathe_chatter.listening.signal_file import Signals

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LatheChatterError, SignalFileError, optional, reason_of
 from lathe_chatter.recording import read_run
 

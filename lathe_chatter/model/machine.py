@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model.quantities import Quantity, check_fields, quantity
 
@@ -234,7 +234,7 @@ class Machine:
 
     def _repr_html_(self) -> str:
         """As a notebook shows it."""
-        from lathe_chatter.model.parameter_table import html_of
+        from lathe_chatter.model.parameter_rows import html_of
 
         return html_of(self)
 

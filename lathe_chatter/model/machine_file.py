@@ -31,7 +31,7 @@ from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.machine import Body, Machine, Mode
 from lathe_chatter.model.quantities import Quantity, limits_of
 from lathe_chatter.model.uncertainty import MODAL, MOST_VARIANCE, Uncertainty
-from lathe_chatter.model.units import number_in
+from lathe_chatter.model.values_with_units import number_in
 from lathe_chatter.model.yaml_section import Section, section_of, text_of
 
 _TURN = 2.0 * np.pi

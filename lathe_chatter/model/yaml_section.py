@@ -9,7 +9,7 @@ import yaml
 
 from lathe_chatter.errors import MachineFileError, ParameterError, nearest_name
 from lathe_chatter.model.quantities import Quantity
-from lathe_chatter.model.units import number_in, units_of
+from lathe_chatter.model.values_with_units import number_in, units_of
 
 _START = yaml.Mark('', 0, 0, 0, None, None)
 _MOST = 10.0

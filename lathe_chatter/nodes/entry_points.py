@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from lathe_chatter.nodes.deferred_signals import exit_on_end_signals
+from lathe_chatter.nodes.end_signals import exit_on_end_signals
 
 
 def lathe() -> None:

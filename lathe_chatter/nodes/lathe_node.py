@@ -15,26 +15,26 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model import Cut
-from lathe_chatter.model.parameter_table import Value
-from lathe_chatter.model.parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
-from lathe_chatter.nodes import run_control, simulation_services
+from lathe_chatter.model.lathe_parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
+from lathe_chatter.model.parameter_rows import Value
+from lathe_chatter.nodes import simulation_control, simulation_services
 from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
+from lathe_chatter.nodes.cut_event_log import LatheRecord
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
-from lathe_chatter.nodes.graph_watch import ClockWatch, PublisherWatch
-from lathe_chatter.nodes.lathe_recording import LatheRecord
+from lathe_chatter.nodes.lathe_diagnostics import FLOOD, TickStatistics
+from lathe_chatter.nodes.lathe_graph_watch import ClockWatch, PublisherWatch
 from lathe_chatter.nodes.lathe_topics import LatheTopics
 from lathe_chatter.nodes.messages import nanoseconds
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.real_time import (
+from lathe_chatter.nodes.real_time_loop import (
     SECOND,
     Pacer,
     RealTime,
     ask_for_short_slices,
     spin_in_ticks,
 )
-from lathe_chatter.nodes.run_control import Answer, RunControl, RunState
-from lathe_chatter.nodes.tick_statistics import FLOOD, TickStatistics
+from lathe_chatter.nodes.simulation_control import Answer, RunControl, RunState
 from lathe_chatter.precompile import LATHE_LOOP, precompile
 
 _BUDGET = 5_000_000
@@ -101,7 +101,7 @@ class LatheNode(ParameterNode):
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
-        run_control.create_services(self)
+        simulation_control.create_services(self)
         if simulation_services.AVAILABLE:
             simulation_services.create_services(self)
         self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=_MAX_KNOCKS))

@@ -13,7 +13,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.nodes.messages import joint_states, time_message
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns

@@ -5,7 +5,7 @@ from __future__ import annotations
 from builtin_interfaces.msg import Time
 from sensor_msgs.msg import JointState
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _SECOND = 10**9

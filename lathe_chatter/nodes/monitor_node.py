@@ -13,12 +13,12 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool, Float64, String
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.parameters import machine_from
+from lathe_chatter.model.lathe_parameters import machine_from
 from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.monitor_sentences import (
@@ -31,12 +31,12 @@ from lathe_chatter.nodes.monitor_sentences import (
     withdrawn,
 )
 from lathe_chatter.nodes.node_main import run_node
+from lathe_chatter.nodes.node_parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
-from lathe_chatter.nodes.real_time import spin_in_ticks
+from lathe_chatter.nodes.real_time_loop import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine
-from lathe_chatter.nodes.sample_stream import SampleBatch, SampleSubscription
+from lathe_chatter.nodes.sample_receiver import SampleBatch, SampleSubscription
 from lathe_chatter.precompile import DETECTOR_LOOP, precompile
 from lathe_chatter.samples.continuity import BlockOrder, Continuity, times_of
 

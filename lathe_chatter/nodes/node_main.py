@@ -22,13 +22,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from lathe_chatter.errors import LatheChatterError, StartError
-from lathe_chatter.nodes.deferred_signals import (
+from lathe_chatter.nodes.end_signals import (
     DeferredSignals,
     ignore_end_signals,
     raise_on_end_signals,
 )
 from lathe_chatter.nodes.log_folder import ensure_log_folder
-from lathe_chatter.nodes.real_time import LOOK_UP
+from lathe_chatter.nodes.real_time_loop import LOOK_UP
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor

@@ -22,15 +22,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.cut_events import on_the_shop_floor, parse_change
+from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor, parse_change
 from lathe_chatter.nodes.diagnostics import DiagnosticsListener
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.operated_cell import OperatedCell
+from lathe_chatter.nodes.node_parameters import PAGE
+from lathe_chatter.nodes.operator_page_cell import OperatedCell
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameters import PAGE
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
-from lathe_chatter.page.board import Board
 from lathe_chatter.page.server import FRAME_PERIOD, PageServer, Viewer
+from lathe_chatter.page.shared_state import Board
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.scenario.scenario import shipped_scenarios
 

@@ -17,9 +17,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import ParameterError, UnknownParameterError
-from lathe_chatter.model.parameter_table import ParameterTable, Value
+from lathe_chatter.model.parameter_rows import ParameterTable, Value
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
-from lathe_chatter.nodes.real_time import RequestLoad
+from lathe_chatter.nodes.real_time_loop import RequestLoad
 
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service')
 _OF_QOS = 'qos_overrides.'

@@ -15,14 +15,14 @@ from lathe_chatter.errors import LatheChatterError, RecordingFailedError, reason
 from lathe_chatter.nodes import recorder_services
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.node_main import run_node
+from lathe_chatter.nodes.node_parameters import RECORDER
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameters import RECORDER
-from lathe_chatter.nodes.real_time import Schedule, spin_in_ticks
+from lathe_chatter.nodes.real_time_loop import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
-from lathe_chatter.nodes.recording_status import news, recording_status
+from lathe_chatter.nodes.recorder_diagnostics import news, recording_status
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
-from lathe_chatter.nodes.run_control import Answer
 from lathe_chatter.nodes.run_folders import RunFolders
+from lathe_chatter.nodes.simulation_control import Answer
 from lathe_chatter.nodes.topic_discovery import TopicWatch, selection
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.run_control import Answer
+from lathe_chatter.nodes.simulation_control import Answer
 
 
 class Recorder(Protocol):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lathe_chatter.errors import LatheChatterError, RunExistsError, reason_of
-from lathe_chatter.recording.mcap_chunk import Compression
+from lathe_chatter.recording.open_chunk import Compression
 
 _Made = TypeVar('_Made')
 

@@ -15,12 +15,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from lathe_chatter.errors import NodeFailedError, RunFailedError
-from lathe_chatter.model.parameters import LATHE
-from lathe_chatter.nodes.deferred_signals import DeferredSignals
+from lathe_chatter.model.lathe_parameters import LATHE
+from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
+from lathe_chatter.nodes.node_parameters import MONITOR, SUPERVISOR
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
-from lathe_chatter.nodes.parameters import MONITOR, SUPERVISOR
 from lathe_chatter.page.server import answers, free_port, open_in_browser
 from lathe_chatter.scenario import Scenario
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from lathe_chatter.nodes.run_control import Answer, RunState, Simulator
+from lathe_chatter.nodes.simulation_control import Answer, RunState, Simulator
 
 try:
     from simulation_interfaces.msg import Result, SimulationState, SimulatorFeatures

@@ -20,13 +20,13 @@ from std_srvs.srv import SetBool, Trigger
 from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.parameter_table import Value
-from lathe_chatter.model.parameters import cut_from, machine_from
+from lathe_chatter.model.lathe_parameters import cut_from, machine_from
+from lathe_chatter.model.parameter_rows import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
+from lathe_chatter.nodes.node_parameters import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameters import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
-from lathe_chatter.report.signal_views import once_per_turn, spectrum
+from lathe_chatter.array_types import Array, Integers
+from lathe_chatter.report.run_excerpts import once_per_turn, spectrum
 from lathe_chatter.samples.continuity import times_of
 
 SIGNALS = ('tool_displacement', 'tool_velocity', 'workpiece_displacement', 'workpiece_velocity')

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.cut_events import on_the_shop_floor
-from lathe_chatter.page.board import Board
-from lathe_chatter.page.chart import draw_chart
+from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
+from lathe_chatter.page.shared_state import Board
+from lathe_chatter.page.stability_chart import draw_chart
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.chunk_messages import messages_of
 from lathe_chatter.recording.mcap_file import RecordedFile

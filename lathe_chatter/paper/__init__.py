@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from lathe_chatter.paper.open_questions import Findings, find
-from lathe_chatter.paper.reproduction import Literal, Reproduced, reproduce_run
-from lathe_chatter.paper.runs import PAPER_RUNS, Pace, PaperRun
+from lathe_chatter.paper.published_runs import PAPER_RUNS, Pace, PaperRun
+from lathe_chatter.paper.reproduced_run import Literal, Reproduced, reproduce_run
 
 __all__ = [
     'PAPER_RUNS',

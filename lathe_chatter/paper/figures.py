@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, paper_initial_state
-from lathe_chatter.paper.reproduction import SAMPLE_RATE, paper_lathe
-from lathe_chatter.paper.runs import PAPER_RUNS, PaperRun, run_named, run_shown_in
+from lathe_chatter.paper.published_runs import PAPER_RUNS, PaperRun, run_named, run_shown_in
+from lathe_chatter.paper.reproduced_run import SAMPLE_RATE, paper_lathe
 from lathe_chatter.plot_style import TOOL, WORKPIECE, grid, new_figure, save, scale_for
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Machine
 from lathe_chatter.paper.figures import WINDOWS
-from lathe_chatter.paper.reproduction import SAMPLE_RATE, paper_lathe
-from lathe_chatter.paper.runs import AXES, PAPER_RUNS, run_named
+from lathe_chatter.paper.published_runs import AXES, PAPER_RUNS, run_named
+from lathe_chatter.paper.reproduced_run import SAMPLE_RATE, paper_lathe
 from lathe_chatter.paper.screening_function import (
     ScreeningReading,
     axes_without_bearing,

@@ -11,8 +11,8 @@ from typing import Any
 
 from lathe_chatter.paper.figures import Picture, paper_pictures
 from lathe_chatter.paper.open_questions import Findings, StiffnessEffect, Window
-from lathe_chatter.paper.reproduction import AGREEMENT, Reproduced
-from lathe_chatter.paper.runs import PAPER_RUNS, run_named
+from lathe_chatter.paper.published_runs import PAPER_RUNS, run_named
+from lathe_chatter.paper.reproduced_run import AGREEMENT, Reproduced
 from lathe_chatter.paper.screening_function import Reading
 
 OVERVIEWS = (

@@ -13,10 +13,10 @@ from enum import Enum
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.model import BearingContact, Machine, paper_initial_state
-from lathe_chatter.paper.runs import AXES, PAPER_RUNS, PaperRun, run_named
+from lathe_chatter.paper.published_runs import AXES, PAPER_RUNS, PaperRun, run_named
 from lathe_chatter.stability import rightmost_root
 
 STEP = 1e-5

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.paper.open_questions import Findings
-from lathe_chatter.paper.reproduction import SAMPLE_RATE, Reproduced, paper_lathe
+from lathe_chatter.paper.reproduced_run import SAMPLE_RATE, Reproduced, paper_lathe
 from lathe_chatter.plot_style import OPEN, SAFE, SEATED, grid, new_figure, save
 from lathe_chatter.report.stability_chart import chart_limits, chart_speeds, draw_limits
 

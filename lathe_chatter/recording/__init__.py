@@ -3,11 +3,11 @@
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.recording.lathe_run_writer import LatheRun
 from lathe_chatter.recording.recover import Recovery, recover
-from lathe_chatter.recording.replay import Difference
 from lathe_chatter.recording.resimulate import Resimulation, resimulate
+from lathe_chatter.recording.resimulated_lathe import Difference
 from lathe_chatter.recording.run import Run, Samples, read_run
+from lathe_chatter.recording.run_writer import RunWriter, Topic
 from lathe_chatter.recording.verify import Finding, Verification, verify
-from lathe_chatter.recording.writer import RunWriter, Topic
 
 __all__ = [
     'Difference',

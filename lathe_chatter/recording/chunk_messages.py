@@ -9,7 +9,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from lathe_chatter.arrays import Integers
+from lathe_chatter.array_types import Integers
 from lathe_chatter.recording.mcap_reader import Chunk
 
 HEAD = np.dtype(

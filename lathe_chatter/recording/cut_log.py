@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
-from lathe_chatter.lathe.cut_events import (
+from lathe_chatter.lathe.cut_event_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
     Change,
@@ -21,7 +21,7 @@ from lathe_chatter.lathe.cut_events import (
     parse_knock,
 )
 from lathe_chatter.model import Cut
-from lathe_chatter.model.parameters import LATHE
+from lathe_chatter.model.lathe_parameters import LATHE
 
 Parameters = Mapping[str, Any]
 _NEEDED = {'spindle_speed_rpm', 'depth_of_cut', 'seed'}

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError, optional
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_blocks import TIME

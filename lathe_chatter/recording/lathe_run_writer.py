@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
 from lathe_chatter.recording.provenance import (
     ENDED_EARLY,
@@ -27,7 +27,7 @@ from lathe_chatter.recording.ros_messages import (
 )
 from lathe_chatter.recording.run_events import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
-from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.recording.run_writer import RunWriter
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
@@ -104,7 +104,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
             self.commit()
 
     def log(self, sentence: str) -> None:
-        """Write what happened to the cut, a sentence of `lathe_chatter.lathe.cut_events`."""
+        """Write what happened to the cut, a sentence of `cut_event_sentences`."""
         logger = self.name.lstrip('/').replace('/', '.')
         self._add('/rosout', log_bytes(logger, sentence, self._stamp()))
 

@@ -40,8 +40,8 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from lathe_chatter.recording.disk_thread import FileSync
-from lathe_chatter.recording.mcap_chunk import ClosedChunk, Compression, OpenChunk, record_bytes
 from lathe_chatter.recording.mcap_summary import OUR_LIBRARY
+from lathe_chatter.recording.open_chunk import ClosedChunk, Compression, OpenChunk, record_bytes
 from lathe_chatter.recording.provenance import sealed
 from lathe_chatter.recording.writer_lock import hold
 

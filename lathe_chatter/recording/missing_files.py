@@ -7,11 +7,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from lathe_chatter.recording.counts_on_disk import FILE_NAME as UNFINISHED
-from lathe_chatter.recording.counts_on_disk import taken
 from lathe_chatter.recording.mcap_file import Note
 from lathe_chatter.recording.metadata import FILE_NAME
 from lathe_chatter.recording.provenance import ENDED_EARLY, IDENTITY, RECOVERED
+from lathe_chatter.recording.received_counts import FILE_NAME as UNFINISHED
+from lathe_chatter.recording.received_counts import taken
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.split_files import CLOSED
 from lathe_chatter.recording.verification_result import Verification

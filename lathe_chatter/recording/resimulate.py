@@ -22,7 +22,7 @@ from lathe_chatter.recording.provenance import (
     noted_number,
 )
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, recorded_cuts
-from lathe_chatter.recording.replay import Difference, Replay
+from lathe_chatter.recording.resimulated_lathe import Difference, Replay
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_blocks import SampleBlocks

@@ -9,7 +9,7 @@ from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.parameters import cut_from, machine_from
+from lathe_chatter.model.lathe_parameters import cut_from, machine_from
 from lathe_chatter.recording.cut_log import CutSession
 from lathe_chatter.recording.run_events import RunLog, SamplesReceived
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
 from lathe_chatter.recording.mcap_file import Raw, RecordedFile

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.samples.codec import BlockLayout, block_layout

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LayoutError, ParameterError
 from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.samples.continuity import Continuity, time_text
@@ -105,7 +105,7 @@ class Samples(NamedTuple):
         Raises:
             ParameterError: If there is no such column, or they have several units.
         """
-        from lathe_chatter.recording.plots import plot_samples
+        from lathe_chatter.recording.sample_plot import plot_samples
 
         return plot_samples(self, columns, axes)
 

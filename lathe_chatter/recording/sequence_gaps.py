@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 
 _SETTLING = 1.0
 """s that a new publisher may be heard before the graph has it."""

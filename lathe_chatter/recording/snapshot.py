@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.run_events import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
-from lathe_chatter.recording.writer import RunWriter
+from lathe_chatter.recording.run_writer import RunWriter
 
 SNAPSHOT = 'lathe_chatter/snapshot'
 """Name of the record of a run that is the end of a longer one: `seconds`, and `reason`."""

@@ -15,7 +15,6 @@ from mcap.records import Channel, Schema
 
 from lathe_chatter.errors import DiskFullError, RunExistsError
 from lathe_chatter.recording.disk_thread import FileSync
-from lathe_chatter.recording.mcap_chunk import Compression, OpenChunk, record_bytes
 from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
 from lathe_chatter.recording.metadata import (
     FileCount,
@@ -25,6 +24,7 @@ from lathe_chatter.recording.metadata import (
     dump_qos,
     replace_file,
 )
+from lathe_chatter.recording.open_chunk import Compression, OpenChunk, record_bytes
 
 CLOSED = 'lathe_chatter/closed'
 """Name of the MCAP metadata record that ends each file of a run; a killed recorder leaves none.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lathe_chatter.arrays import Integers
+from lathe_chatter.array_types import Integers
 from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.export import Exported, ExportedParts, Progress
 from lathe_chatter.recording.mcap_file import Raw, offered_qos
@@ -15,9 +15,9 @@ from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import Timeline, read_timeline
+from lathe_chatter.recording.run_writer import RunWriter
 from lathe_chatter.recording.sample_blocks import TIME
 from lathe_chatter.recording.sample_series import Selection
-from lathe_chatter.recording.writer import RunWriter
 from lathe_chatter.samples.codec import encode_number
 
 NUMBER_TYPE = 'std_msgs/msg/Float64'

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.plot_style import LINE, NEUTRAL, TOOL, WORKPIECE, grid, new_figure, save
 from lathe_chatter.tap_test import ModalFit
-from lathe_chatter.tap_test.frequency_response import ORDERS, Complex
+from lathe_chatter.tap_test.measured_response import ORDERS, Complex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Machine
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, grid, scale_for, widen
+from lathe_chatter.report.run_excerpts import Excerpt
 from lathe_chatter.report.run_history import History
-from lathe_chatter.report.signal_views import Excerpt
 from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.samples.continuity import Continuity
 from lathe_chatter.samples.extremes import TIME, Extremes
 

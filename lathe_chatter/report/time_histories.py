@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
-from lathe_chatter.lathe.cut_events import on_the_shop_floor
+from lathe_chatter.array_types import Array
+from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
 from lathe_chatter.plot_style import (
     ALARM,
     ALARM_TEXT,
@@ -24,8 +24,8 @@ from lathe_chatter.plot_style import (
     text_of,
     widen,
 )
+from lathe_chatter.report.run_excerpts import clearance_is_seen
 from lathe_chatter.report.run_history import History
-from lathe_chatter.report.signal_views import clearance_is_seen
 from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:

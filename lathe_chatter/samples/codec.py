@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.samples.columns import SAMPLE_COLUMNS
 

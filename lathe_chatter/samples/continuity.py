@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LayoutError
 
 _LONGEST_STEP = 1.5

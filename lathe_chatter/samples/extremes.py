@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.samples.continuity import Continuity
 
 TIME = 'time'

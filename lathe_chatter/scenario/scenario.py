@@ -19,8 +19,8 @@ from lathe_chatter.errors import (
     nearest_name,
     reason_of,
 )
+from lathe_chatter.model.lathe_parameters import LATHE, MACHINE_FILE
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
-from lathe_chatter.model.parameters import LATHE, MACHINE_FILE
 from lathe_chatter.model.quantities import Quantity
 
 RECOMMENDED = 'recommended'

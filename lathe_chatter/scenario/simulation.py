@@ -14,8 +14,13 @@ from pathlib import Path
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.config import LatheConfig, config_from
-from lathe_chatter.lathe.cut_events import BEGINNING, Knock, change_sentence, knock_sentence
-from lathe_chatter.model.parameters import LATHE, described_by
+from lathe_chatter.lathe.cut_event_sentences import (
+    BEGINNING,
+    Knock,
+    change_sentence,
+    knock_sentence,
+)
+from lathe_chatter.model.lathe_parameters import LATHE, described_by
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.scenario.player import ScenarioPlayer
 from lathe_chatter.scenario.scenario import CLEARED, FLAGGED, Scenario, Step

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.stability.characteristic import receptance
 from lathe_chatter.stability.compiled_characteristic import ALPHA, BETA, DAMPING, STIFFNESS
 from lathe_chatter.stability.critical_depth import frequency_grid

@@ -24,7 +24,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Body, Cut, Machine
 from lathe_chatter.model.quantities import Quantity, quantity_of

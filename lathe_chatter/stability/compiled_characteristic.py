@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import cmath
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 
 ALPHA, BETA, DAMPING, STIFFNESS = range(4)

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.result_file import spread_into
+from lathe_chatter.resumable_results import spread_into
 from lathe_chatter.stability.characteristic import ProcessDamping, checked
 from lathe_chatter.stability.periodic_map import SpeedLaw
 from lathe_chatter.stability.roots import rightmost_roots

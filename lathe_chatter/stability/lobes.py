@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.model import Machine
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.stability.characteristic import (

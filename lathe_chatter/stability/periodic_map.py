@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut, Machine

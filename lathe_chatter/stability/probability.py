@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import Quantity, count_of
 from lathe_chatter.model.uncertainty import Uncertainty
-from lathe_chatter.result_file import spread_into
+from lathe_chatter.resumable_results import spread_into
 from lathe_chatter.stability.characteristic import checked
 from lathe_chatter.stability.safe_limit import safe_limit
 

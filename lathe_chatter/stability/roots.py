@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantities import Quantity

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantities import Quantity
 from lathe_chatter.stability.characteristic import (

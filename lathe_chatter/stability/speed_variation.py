@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.stability.characteristic import Complex, checked
-from lathe_chatter.stability.dominant_eigenvalue import dominant_eigenvalue
+from lathe_chatter.stability.matrix_free_eigenvalue import dominant_eigenvalue
 from lathe_chatter.stability.periodic_map import (
     Element,
     Elements,

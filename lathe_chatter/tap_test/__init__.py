@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lathe_chatter.errors import FrequencyResponseError, ModalFitError
-from lathe_chatter.tap_test.frequency_response import FrequencyResponse, read_frequency_responses
+from lathe_chatter.tap_test.measured_response import FrequencyResponse, read_frequency_responses
 from lathe_chatter.tap_test.modal_fit import FittedMode, ModalFit, fit_modes
 
 __all__ = [

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ModalFitError
-from lathe_chatter.tap_test.frequency_response import FrequencyResponse
+from lathe_chatter.tap_test.measured_response import FrequencyResponse
 
 _POLE_ORDER = 40
 _AGREEING = 5

@@ -22,10 +22,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import least_squares, nnls
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ModalFitError
 from lathe_chatter.tap_test.candidate_poles import candidate_poles
-from lathe_chatter.tap_test.frequency_response import Complex, FrequencyResponse
+from lathe_chatter.tap_test.measured_response import Complex, FrequencyResponse
 
 MOST_MODES = 8
 _EXPLAINED = 0.05

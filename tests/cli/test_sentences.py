@@ -19,7 +19,7 @@ from support.recorded import number, topic
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.config import config_from
-from lathe_chatter.model.parameters import parameters_of
+from lathe_chatter.model.lathe_parameters import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter
 
 CLI = Path(__file__).resolve().parents[2] / 'lathe_chatter' / 'cli'
@@ -232,7 +232,7 @@ def situations(folder: Path, runs: dict[str, Path]) -> Iterator[tuple[str, list[
 def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp('said')
     told = {}
-    for name, call in situations(folder, made(tmp_path_factory.mktemp('runs'))):
+    for name, call in situations(folder, made(tmp_path_factory.mktemp('published_runs'))):
         with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as errors:
             assert main(call) in {0, 1, 3}, errors.getvalue()
         told[name] = out.getvalue() + errors.getvalue()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.lathe import VirtualLathe

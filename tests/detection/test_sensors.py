@@ -9,7 +9,7 @@ import pytest
 
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.detection.estimate import Mode
-from lathe_chatter.detection.motion_filter import MotionFilter, sensors_among
+from lathe_chatter.detection.sensors_to_displacement import MotionFilter, sensors_among
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut
 from lathe_chatter.stability import rightmost_root

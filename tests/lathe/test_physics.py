@@ -11,7 +11,7 @@ import itertools
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import EventKind, VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 

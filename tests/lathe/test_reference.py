@@ -12,7 +12,7 @@ from support.reference import dop853, taylor
 from support.reference.roots import first_root, horner
 from support.reference.solution import event_error, relative_error
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
 
 _RATE = 1e4

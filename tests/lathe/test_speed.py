@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.reference import by_angle
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from support.reference import dop853
 from support.reference.solution import Event, event_error
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import EventKind, VirtualLathe
 from lathe_chatter.model import Cut, Machine, Mode
 

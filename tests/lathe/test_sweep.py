@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import Processes
 from lathe_chatter.lathe import VirtualLathe

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe import EventKind, VirtualLathe
 from lathe_chatter.lathe.integrator import state_layout as layout

@@ -22,15 +22,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from support.node_bench import DEEP, LATCHED, Bench, messages_of, samples_of
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_events import Change, parse_change
+from lathe_chatter.lathe.cut_event_sentences import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.nodes.lathe_diagnostics import FLOOD
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.messages import joint_states
-from lathe_chatter.nodes.run_control import RunState
-from lathe_chatter.nodes.tick_statistics import FLOOD
+from lathe_chatter.nodes.simulation_control import RunState
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 TICK = 20

@@ -12,13 +12,13 @@ from rcl_interfaces.msg import Log
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 from support.node_bench import LATCHED, Bench
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
-from lathe_chatter.nodes.parameters import RECORDED_TOPICS
+from lathe_chatter.nodes.node_parameters import RECORDED_TOPICS
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
 

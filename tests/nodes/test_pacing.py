@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lathe_chatter.nodes.real_time import SECOND, Pacer
+from lathe_chatter.nodes.real_time_loop import SECOND, Pacer
 
 TICK = 2_000_000
 

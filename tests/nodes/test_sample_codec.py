@@ -10,7 +10,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import SampleDecoder, encode_block, encode_number

@@ -11,10 +11,10 @@ import sys
 
 import pytest
 
-from lathe_chatter.nodes.real_time import RealTime
+from lathe_chatter.nodes.real_time_loop import RealTime
 
 GET_ATTRIBUTES = {'x86_64': 315, 'aarch64': 275}
-ASK = 'from lathe_chatter.nodes.real_time import ask_for_short_slices as a; print(a())'
+ASK = 'from lathe_chatter.nodes.real_time_loop import ask_for_short_slices as a; print(a())'
 
 
 def kernel() -> tuple[int, int]:
@@ -57,7 +57,7 @@ def test_a_policy_that_somebody_chose_is_kept() -> None:
 
 REAL_TIME = """
 import os, subprocess, sys
-from lathe_chatter.nodes.real_time import RealTime
+from lathe_chatter.nodes.real_time_loop import RealTime
 child = [sys.executable, '-c', 'import os; print(os.sched_getscheduler(0))']
 place = RealTime(1)
 for wanted in (True, True, False):
@@ -95,7 +95,7 @@ def test_real_time_is_not_asked_for_where_it_is_not_wanted_or_somebody_chose() -
     assert never.word == 'ordinary'
     chosen = (
         'import os; os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0));'
-        'from lathe_chatter.nodes.real_time import RealTime; place = RealTime(1);'
+        'from lathe_chatter.nodes.real_time_loop import RealTime; place = RealTime(1);'
         'place.hold(wanted=True); print(os.sched_getscheduler(0) == os.SCHED_BATCH)'
     )
     out = subprocess.run(

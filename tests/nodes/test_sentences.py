@@ -16,9 +16,9 @@ import lathe_chatter.nodes
 NODES = Path(lathe_chatter.nodes.__file__).parent
 TESTS = Path(__file__).parents[1]
 LATHE, CLOCK = 'nodes/test_lathe_node.py', 'nodes/test_followed_clock.py'
-CONTROL, STANDARD = 'nodes/test_run_control.py', 'nodes/test_simulation_services.py'
+CONTROL, STANDARD = 'nodes/test_simulation_control.py', 'nodes/test_simulation_services.py'
 MAIN, MONITOR = 'nodes/test_node_main.py', 'nodes/test_monitor_node.py'
-STATISTICS, GROUP = 'nodes/test_tick_statistics.py', 'nodes/test_node_processes.py'
+STATISTICS, GROUP = 'nodes/test_lathe_diagnostics.py', 'nodes/test_node_processes.py'
 
 SAID = {
     'lathe_node.py': {
@@ -70,7 +70,7 @@ SAID = {
             f'{LATHE}::test_it_cannot_drive_the_clock_that_it_follows',
         ),
     },
-    'graph_watch.py': {
+    'lathe_graph_watch.py': {
         '/clock stands still at {} s, and the cut with it.': (
             'the same; told once each time that it stops',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
@@ -88,7 +88,7 @@ SAID = {
             f'{LATHE}::test_a_second_lathe_on_the_topic_is_named',
         ),
     },
-    'tick_statistics.py': {
+    'lathe_diagnostics.py': {
         'behind: simulated time was given up': (
             'something was given up since the last report',
             f'{CLOCK}::test_a_jump_of_the_clock_is_told_and_not_cut',
@@ -126,7 +126,7 @@ SAID = {
             f'{LATHE}::test_the_guard_ends_the_run_and_a_reset_begins_another',
         ),
     },
-    'run_control.py': {
+    'simulation_control.py': {
         'One tick.': (
             'it is paused',
             f'{CONTROL}::test_a_step_is_refused_while_running_and_leaves_a_pause_as_it_is',
@@ -224,7 +224,7 @@ SAID = {
             ),
         ),
     },
-    'real_time.py': {
+    'real_time_loop.py': {
         'real time, priority {}': (
             'the thread is scheduled so',
             'nodes/test_scheduling.py::test_real_time_is_held_while_wanted_and_never_inherited',

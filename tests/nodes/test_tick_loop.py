@@ -16,7 +16,7 @@ from support.node_bench import messages_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.node_main import make_executor
-from lathe_chatter.nodes.real_time import Served, spin_in_ticks
+from lathe_chatter.nodes.real_time_loop import Served, spin_in_ticks
 
 PATIENCE = 60.0
 

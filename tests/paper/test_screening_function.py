@@ -8,8 +8,8 @@ import pytest
 from lathe_chatter.model import BearingContact, Machine
 from lathe_chatter.paper.figures import WINDOWS
 from lathe_chatter.paper.open_questions import coefficient_range
-from lathe_chatter.paper.reproduction import paper_lathe
-from lathe_chatter.paper.runs import run_named
+from lathe_chatter.paper.published_runs import run_named
+from lathe_chatter.paper.reproduced_run import paper_lathe
 from lathe_chatter.paper.screening_function import (
     Reading,
     ScreeningReading,

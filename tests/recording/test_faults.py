@@ -13,7 +13,7 @@ from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from support.recorded import ARRAY, STORE, block, number, topic
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.recording import RunWriter, read_run, recover, verify

@@ -18,7 +18,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from support.recorded import ARRAY, STORE, block, topic
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.cli.main import main
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe

@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from support.recorded import ARRAY, BOOL, NUMBER, block, number, topic
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.recording import read_run, recover, verify

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from support.recorded import topic
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.cut_events import (
+from lathe_chatter.lathe.cut_event_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
     change_sentence,
     knock_sentence,
 )
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.model.parameters import parameters_of
+from lathe_chatter.model.lathe_parameters import parameters_of
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
 from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.ros_messages import parameters_bytes

@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import Writer as McapWriter
 from support.recorded import ARRAY, topic
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.recording import read_run, verify
 from lathe_chatter.samples.codec import encode_block

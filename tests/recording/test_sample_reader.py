@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.recorded import number, topic
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.recording import RunWriter, read_run
 from lathe_chatter.recording.mcap_file import RecordedFile

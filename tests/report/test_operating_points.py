@@ -13,8 +13,8 @@ from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.report.operating_points import charts_of, draw_path, probabilities_of
 from lathe_chatter.report.probability_chart import SURE, probability_sentence
+from lathe_chatter.report.run_excerpts import excerpts_of
 from lathe_chatter.report.run_history import History, read_history
-from lathe_chatter.report.signal_views import excerpts_of
 from lathe_chatter.report.stability_chart import bearing_text
 from lathe_chatter.stability import safe_limit
 

@@ -11,8 +11,8 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut
 from lathe_chatter.report.phase_and_spectrum import draw_portrait, draw_section, draw_spectrum
 from lathe_chatter.report.plotted_samples import RunSamples
+from lathe_chatter.report.run_excerpts import excerpts_of
 from lathe_chatter.report.run_history import History
-from lathe_chatter.report.signal_views import excerpts_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 

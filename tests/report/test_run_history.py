@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_events import Change
+from lathe_chatter.lathe.cut_event_sentences import Change
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.report.plotted_samples import RunSamples
+from lathe_chatter.report.run_excerpts import excerpts_of
 from lathe_chatter.report.run_history import History
-from lathe_chatter.report.signal_views import excerpts_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 

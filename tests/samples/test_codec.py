@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.recorded import block as by_rosbags
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.samples.codec import SampleDecoder, encode_block
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.samples.continuity import BlockOrder, Continuity, follow_evenly, times_of
 

@@ -14,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from std_srvs.srv import SetBool, Trigger
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.samples.codec import SampleDecoder
 
 DEEP = QoSProfile(depth=5000)

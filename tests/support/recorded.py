@@ -8,7 +8,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.recording import Topic
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.tap_test import FrequencyResponse
-from lathe_chatter.tap_test.frequency_response import ORDERS
+from lathe_chatter.tap_test.measured_response import ORDERS
 
 THREE_MODES = ((118.0, 0.03, 2e7), (310.0, 0.02, 4e7), (845.0, 0.015, 9e7))
 """Frequency Hz, damping ratio, stiffness N/m of each."""

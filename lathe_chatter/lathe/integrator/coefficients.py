@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.eigenbasis import Basis, basis_of, inverse_of, product
+from lathe_chatter.lathe.integrator.eigenvectors import Basis, basis_of, inverse_of, product
 from lathe_chatter.lathe.integrator.propagation import RATE_STEP, TERMS
 from lathe_chatter.lathe.integrator.surface import aligned
 from lathe_chatter.model import BearingContact, Cut, Machine

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import piece as at
+from lathe_chatter.lathe.integrator import piece_end as at
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
-from lathe_chatter.lathe.integrator.event_search import (
+from lathe_chatter.lathe.integrator.first_crossing import NEVER
+from lathe_chatter.lathe.integrator.lanes import fma
+from lathe_chatter.lathe.integrator.piece_end import by_time, plan_piece
+from lathe_chatter.lathe.integrator.power_series import (
     NOTHING,
     Machine,
     Scratch,
@@ -22,9 +25,6 @@ from lathe_chatter.lathe.integrator.event_search import (
     kind_of,
     solve_series,
 )
-from lathe_chatter.lathe.integrator.events import NEVER
-from lathe_chatter.lathe.integrator.lanes import fma
-from lathe_chatter.lathe.integrator.piece import by_time, plan_piece
 from lathe_chatter.lathe.integrator.propagation import coordinates_at, read_outputs
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.state_layout import (

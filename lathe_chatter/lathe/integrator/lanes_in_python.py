@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 
 LANES = 8
 """Steps of a block."""

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import block as at
-from lathe_chatter.lathe.integrator import noise, surface
+from lathe_chatter.lathe.integrator import random_numbers, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.events import may_turn_back
+from lathe_chatter.lathe.integrator.first_crossing import may_turn_back
 from lathe_chatter.lathe.integrator.lanes import (
     LANES,
     after,
@@ -34,8 +34,8 @@ from lathe_chatter.lathe.integrator.lanes import (
     spread,
     turned_on,
 )
-from lathe_chatter.lathe.integrator.piece import by_time
-from lathe_chatter.lathe.integrator.samples import COLUMNS, add_runout, write_accelerations
+from lathe_chatter.lathe.integrator.output_samples import COLUMNS, add_runout, write_accelerations
+from lathe_chatter.lathe.integrator.piece_end import by_time
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.surface_kinks import bend_of, by_place, finish_corner
 from lathe_chatter.lathe.integrator.surface_met import look_up, nodes_on_grid, surface_on_grid
@@ -91,8 +91,8 @@ def take_plain_steps(
     tool_noise, cut_noise = settings[layout.FORCE_NOISE], settings[layout.CUTTING_FORCE_NOISE]
     noisy = tool_noise != 0.0 or cut_noise != 0.0
     seed = int(settings[layout.SEED])
-    tool_key = noise.stream_key(seed, noise.FORCE_STREAM)
-    cut_key = noise.stream_key(seed, noise.CUTTING_FORCE_STREAM)
+    tool_key = random_numbers.stream_key(seed, random_numbers.FORCE_STREAM)
+    cut_key = random_numbers.stream_key(seed, random_numbers.CUTTING_FORCE_STREAM)
     accelerations = out.shape[1] > COLUMNS
     coupled = direct[layout.COUPLED] != 0.0
     regime, steps = counts[layout.REGIME], counts[layout.STEPS]
@@ -122,8 +122,8 @@ def take_plain_steps(
             speed_curvature(1.0, 0.0, variation, phase, frequency) if varied else 0.0,
         )  # fmt: skip
     if noisy:
-        on_tool = tool_noise * noise.normal(tool_key, samples)
-        between = cut_noise * noise.normal(cut_key, samples)
+        on_tool = tool_noise * random_numbers.normal(tool_key, samples)
+        between = cut_noise * random_numbers.normal(cut_key, samples)
     by_tool, by_cut = direct[layout.TOOL_FORCE], direct[layout.CUTTING_FORCE]
     bend = bend_of(z, outputs, direct, u0, 0.0, 0.0, f0)
     if counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0:
@@ -159,8 +159,8 @@ def take_plain_steps(
             sample, step = samples, index
             for k in range(taken):
                 if step == 0:
-                    on_tool = tool_noise * noise.normal(tool_key, sample)
-                    between = cut_noise * noise.normal(cut_key, sample)
+                    on_tool = tool_noise * random_numbers.normal(tool_key, sample)
+                    between = cut_noise * random_numbers.normal(cut_key, sample)
                 block[at.ON_TOOL, k], block[at.BETWEEN, k] = on_tool, between
                 step += 1
                 if step == steps:

@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator.lanes import (
     LANES,

@@ -13,23 +13,23 @@ import math
 
 import numpy as np
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import block as at
-from lathe_chatter.lathe.integrator import noise, surface
+from lathe_chatter.lathe.integrator import random_numbers, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
-from lathe_chatter.lathe.integrator.event_search import Machine, Scratch
 from lathe_chatter.lathe.integrator.event_step import take_step
 from lathe_chatter.lathe.integrator.lanes import LANES
-from lathe_chatter.lathe.integrator.plain_steps import take_plain_steps
-from lathe_chatter.lathe.integrator.propagation import TERMS
-from lathe_chatter.lathe.integrator.samples import (
+from lathe_chatter.lathe.integrator.output_samples import (
     COLUMNS,
     add_runout,
     add_sensor_noise,
     write_accelerations,
     write_sample,
 )
+from lathe_chatter.lathe.integrator.plain_steps import take_plain_steps
+from lathe_chatter.lathe.integrator.power_series import Machine, Scratch
+from lathe_chatter.lathe.integrator.propagation import TERMS
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope
 from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 
@@ -88,11 +88,11 @@ def _take_any_step(
     on_tool, between = settings[layout.FORCE_NOISE], settings[layout.CUTTING_FORCE_NOISE]
     seed = int(settings[layout.SEED])
     if on_tool != 0.0:
-        key = noise.stream_key(seed, noise.FORCE_STREAM)
-        on_tool *= noise.normal(key, counts[layout.SAMPLES])
+        key = random_numbers.stream_key(seed, random_numbers.FORCE_STREAM)
+        on_tool *= random_numbers.normal(key, counts[layout.SAMPLES])
     if between != 0.0:
-        key = noise.stream_key(seed, noise.CUTTING_FORCE_STREAM)
-        between *= noise.normal(key, counts[layout.SAMPLES])
+        key = random_numbers.stream_key(seed, random_numbers.CUTTING_FORCE_STREAM)
+        between *= random_numbers.normal(key, counts[layout.SAMPLES])
     found, status = take_step(
         numbers, z, counts, nodes, settings, machine, on_tool, between, events, found, scratch
     )  # fmt: skip

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 
 # Rows: those of many nodes lie side by side, and are read and written together (lanes.py).

@@ -7,7 +7,7 @@ goes on with.
 
 from __future__ import annotations
 
-from lathe_chatter.arrays import Array, Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.spindle import sine_and_cosine

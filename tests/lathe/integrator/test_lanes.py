@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import lanes
 from lathe_chatter.lathe.integrator import lanes_in_python as plain
 from lathe_chatter.lathe.integrator.lanes import LANES

@@ -9,7 +9,7 @@ import pytest
 from numpy.polynomial import Polynomial
 from scipy.linalg import expm
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import propagation
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import (

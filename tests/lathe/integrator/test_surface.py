@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import surface
 
 _QUINTIC = Polynomial([0.3, -1.0, 2.0, 0.7, -1.3, 0.4])

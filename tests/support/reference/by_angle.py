@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
 
 _BREAK_TURNS = 8

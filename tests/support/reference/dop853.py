@@ -18,7 +18,7 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine, paper_initial_state
 from support.reference.solution import Event, Solution
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lathe_chatter.arrays import Array
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Machine
 
 

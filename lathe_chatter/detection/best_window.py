@@ -1,0 +1,110 @@
+"""What is handed out: the state, and the figures of the window that knows best."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.compiled import compiled
+from lathe_chatter.detection.baseline import SETTLING
+from lathe_chatter.detection.detector_state import (
+    CHATTER,
+    FORCED,
+    HOPS,
+    IDLE,
+    STABLE,
+    UNKNOWN,
+    WATCH,
+    WINDOWS,
+    DetectorState,
+)
+from lathe_chatter.detection.structured_arrays import Records
+
+_WATCH = 0.75
+_ONSET = 8
+"""Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
+_CUTS, _PUSHED = 4.0, 32
+"""Standard errors from which on a force is one, and hops over which its mean is taken."""
+_NO_PUSH = 0.25
+"""Of the largest mean push that there was: less is none."""
+_HEARD, _SURE, _NEXT_TO_NOTHING = 0.15, 3.0, 0.005
+"""Part of the signal that is no noise; standard errors; C w over the stiffness of the tool."""
+
+
+@compiled(inner=True)
+def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
+    """Whether anything may be cut: only where nothing is for sure, the state is idle.
+
+    A tool that once was pushed aside on average and is no more cuts nothing. Who never was has
+    sensors without a mean, or there is none: then nothing is cut where nothing but the sensors'
+    noise is heard, or C w is surely next to nothing.
+    """
+    mean = squares = 0.0
+    for back in range(_PUSHED):
+        place = products[(now.newest - back) % HOPS].tool_mean
+        mean += place / _PUSHED
+        squares += place**2 / _PUSHED
+    # Neighbours vibrate together: the mean of 32 is about as sure as that of 8.
+    error = math.sqrt(max(squares - mean**2, 0.0) / (_PUSHED / 4.0))
+    if abs(mean) > _CUTS * error:
+        now.push = max(now.push, abs(mean))
+        return True
+    if now.push > 0.0:
+        return bool(abs(mean) + error > _NO_PUSH * now.push)
+    if settings.has_machine == 0 or known.cutting > _CUTS * known.cutting_error:
+        return True
+    heard = known.clearness > _HEARD
+    most = known.cutting + _SURE * known.cutting_error
+    return bool(heard and not most < _NEXT_TO_NOTHING * settings.tool_stiffness)
+
+
+@compiled(inner=True)
+def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
+    """Which of `estimate.STATES`, by its number."""
+    now = state.now[0]
+    if now.alarmed != 0:
+        return CHATTER
+    if now.ramping != 0 or now.hops_seen < SETTLING:
+        return UNKNOWN
+    if not cutting:
+        return IDLE
+    if now.score > _WATCH * now.strictness:
+        return WATCH
+    if forced:
+        return FORCED
+    return STABLE
+
+
+@compiled(inner=True)
+def write_figures(
+    state: DetectorState, windows: Records, wave: tuple[float, float, float], model: bool,
+    amplitude: float,
+) -> None:  # fmt: skip
+    """Hand out the figures of the window that knows the growth rate best."""
+    now = state.now[0]
+    now.amplitude = amplitude
+    if not (amplitude > now.smallest_amplitude or now.alarmed != 0):
+        # What is left of a cut that has settled are roundings, from which nothing is known.
+        now.growth = now.growth_error = now.omega = np.nan
+        now.cutting = now.stiffness = np.nan
+        return
+    best = -1
+    alarmed, since = now.alarmed != 0, now.since_alarm
+    for number in range(windows.shape[0]):
+        if alarmed and best >= 0 and WINDOWS[number] > since + _ONSET:
+            break
+        error = windows[number].growth_error
+        if error == error and (best < 0 or error < windows[best].growth_error):
+            best = number
+    if best < 0:
+        now.growth, now.growth_error, now.omega = wave
+        now.cutting = now.stiffness = np.nan
+        return
+    known = windows[best]
+    now.growth, now.growth_error = known.growth, known.growth_error
+    now.omega = known.angular_frequency
+    if model:
+        now.cutting, now.cutting_error = known.cutting, known.cutting_error
+        now.stiffness = known.stiffness

@@ -1,0 +1,126 @@
+"""What happens to the cut: into the log, and into a run of its own where `record` asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from lathe_chatter.array_types import Array
+from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.lathe.config import recorded_config
+from lathe_chatter.lathe.cut_event_sentences import (
+    BEGINNING,
+    BEGINNING_AGAIN,
+    change_sentence,
+    knock_sentence,
+)
+from lathe_chatter.lathe.doubts import doubts
+from lathe_chatter.model import Cut
+from lathe_chatter.nodes.bounded_log import QuickLog
+from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
+from lathe_chatter.recording import LatheRun
+
+_COMMIT_PERIOD = 0.25
+"""s between two commits: what a kill can lose."""
+
+
+class LatheRecord:
+    """Logs what happens to the cut; with `record` it also writes the samples, in this process.
+
+    A disk that takes no more ends the record, not the lathe.
+
+    Args:
+        node: The lathe.
+        values: Its parameters at the start.
+
+    Raises:
+        RunExistsError: If the folder of the run exists.
+        OSError: If it cannot be made.
+    """
+
+    def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
+        """Begin, at time zero."""
+        self._logger = QuickLog(node.get_logger())
+        self._run: LatheRun | None = None
+        self._folder, self._failure = values['record'], ''
+        if self._folder:
+            name = node.get_fully_qualified_name()
+            self._run = LatheRun(Path(self._folder), values, name=name)
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            node.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
+        self._log(BEGINNING)
+        config = recorded_config(values)
+        self._setup, self._doubts = config.setup, list[str]()
+        self._doubt(config.cut)
+
+    def write(self, samples: Array) -> None:
+        """Write the samples of a tick (n, 8)."""
+        if self._run is not None:
+            try:
+                self._run.write(samples)
+            except (OSError, LatheChatterError) as error:
+                self._fail(error)
+
+    def changed(self, time: float, old: Cut, new: Cut) -> None:
+        """The cut was changed at a simulated time, s."""
+        self._log(change_sentence(time, old, new))
+        self._doubt(new)
+
+    def knocked(self, time: float, impulse: float) -> None:
+        """The tool was hit with an impulse, N s."""
+        self._log(knock_sentence(time, impulse))
+
+    def restarted(self, time: float, old: Cut, new: Cut) -> None:
+        """The lathe begins again, with a cut that may have been asked for since its last tick."""
+        self._log(change_sentence(time, old, new))
+        self._log(BEGINNING_AGAIN)
+
+    def statuses(self) -> list[Status]:
+        """What diagnostics show of the record, if there is one."""
+        if not self._folder:
+            return []
+        if self._failure:
+            return [Status('own record', ERROR, self._failure)]
+        return [Status('own record', OK, 'recording', {'run': self._folder})]
+
+    def close(self) -> None:
+        """Finish the run."""
+        if self._run is not None:
+            try:
+                self._run.close()
+            except OSError as error:
+                self._fail(error)
+            self._run = None
+
+    def _doubt(self, cut: Cut) -> None:
+        """Say why the samples may not be what was meant; each sentence once."""
+        for sentence in doubts(self._setup, cut):
+            if sentence not in self._doubts:
+                self._doubts.append(sentence)
+                self._logger.warning(sentence)
+
+    def _log(self, sentence: str) -> None:
+        if sentence:
+            self._logger.info(sentence)
+            if self._run is not None:
+                self._run.log(sentence)
+
+    def _commit(self) -> None:
+        if self._run is not None:
+            try:
+                self._run.commit()
+            except (OSError, LatheChatterError) as error:
+                self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        said = isinstance(error, LatheChatterError)
+        self._failure = str(error) if said else f'{self._folder}: {error}.'
+        sentence = f'The lathe goes on without its record. {self._failure}'
+        self._logger.error(sentence)
+        if self._run is not None:
+            self._run.abandon()
+            self._run = None

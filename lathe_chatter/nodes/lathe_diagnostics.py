@@ -1,0 +1,193 @@
+"""What the node `lathe` says about itself: its pace, and what it is doing to the workpiece."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
+from lathe_chatter.nodes.real_time_loop import SECOND, Pacer, RequestLoad
+from lathe_chatter.nodes.simulation_control import RunControl, RunState
+
+_MICRO = 1e-3
+"""us in a ns."""
+_LATEST = 4096
+FLOOD = 0.25
+"""Fraction of the time that requests take when they are called a flood."""
+_LATE = 0.1
+"""s behind the clock from which a node no longer keeps up."""
+
+
+class Durations:
+    """The latest durations of something done over and over, and their quantiles."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._ring = np.zeros(_LATEST)
+        self._count = 0
+
+    def add(self, duration: float) -> None:
+        """Note one."""
+        self._ring[self._count % _LATEST] = duration
+        self._count += 1
+
+    def quantiles(self, *fractions: float) -> tuple[float, ...]:
+        """The quantiles of those noted since `clear`, 4096 at most; zeros where none were."""
+        known = self._ring[: min(self._count, _LATEST)]
+        return tuple(np.quantile(known, fractions)) if known.size else (0.0,) * len(fractions)
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._count = 0
+
+
+class _Mark(NamedTuple):
+    """Where the counters stood when the last second ended."""
+
+    ticks: int
+    overruns: int
+    lag: float
+    served: int
+    taken: int
+    at: int
+
+
+class TickStatistics:
+    """Counts and times the ticks, and turns them into statuses.
+
+    Args:
+        pacer: Whose lag is reported.
+        tick: Simulated duration of a tick, ns.
+        requests: That are served beside the ticks.
+    """
+
+    def __init__(self, pacer: Pacer, tick: float, requests: RequestLoad) -> None:
+        """Begin at no ticks."""
+        self._pacer, self._requests = pacer, requests
+        self._tick = tick
+        self.ticks = 0
+        self._steps = Durations()
+        self._lateness = Durations()
+        self.begin_second()
+
+    def note_tick(self, duration: int, lathe: VirtualLathe) -> None:
+        """Count a tick that took `duration` ns to compute and publish."""
+        self.ticks += 1
+        self._steps.add(duration)
+        self._engaged += lathe.bearing_engaged
+        self._in_cut += lathe.tool_in_cut
+
+    def note_lateness(self, lateness: float) -> None:
+        """Note by how much a tick came late, ns."""
+        self._lateness.add(lateness)
+
+    @property
+    def behind(self) -> bool:
+        """Whether simulated time was given up in this second."""
+        return self._pacer.overruns > self._before.overruns
+
+    def begin_second(self) -> None:
+        """Forget what belonged to the second that was reported."""
+        now = time.monotonic_ns()
+        requests = self._requests
+        self._before = _Mark(
+            self.ticks, self._pacer.overruns, self._pacer.lag, requests.served, requests.taken, now
+        )
+        self._steps.clear()
+        self._lateness.clear()
+        self._engaged = self._in_cut = 0
+
+    @property
+    def requests_share(self) -> float:
+        """What requests took of the time in this second, as a fraction."""
+        elapsed = max(1, time.monotonic_ns() - self._before.at)
+        return (self._requests.taken - self._before.taken) / elapsed
+
+    @property
+    def requests_served(self) -> int:
+        """How many requests were served in this second."""
+        return self._requests.served - self._before.served
+
+    def pace(
+        self, control: RunControl, *, asked: float, late: float, clock: str, scheduling: str
+    ) -> Status:
+        """The status of the pace.
+
+        Args:
+            control: Whether time goes on.
+            asked: The real-time factor asked for, 0 for as fast as possible.
+            late: How late the last tick is that should have been made by now, s.
+            clock: What is wrong with /clock; empty if nothing is.
+            scheduling: Of the thread that ticks.
+        """
+        elapsed = max(1, time.monotonic_ns() - self._before.at)
+        reached = (self.ticks - self._before.ticks) * self._tick / elapsed
+        level, message = self._verdict(control, asked, late, clock)
+        p50, p99, largest = (q * _MICRO for q in self._steps.quantiles(0.5, 0.99, 1.0))
+        late99, latest = (q * _MICRO for q in self._lateness.quantiles(0.99, 1.0))
+        values = {
+            'real-time factor': reached,
+            'real-time factor asked for': asked,
+            'ticks': self.ticks,
+            'overruns': self._pacer.overruns,
+            'lag given up, s': self._pacer.lag / SECOND,
+            'lag given up in the last second, s': (self._pacer.lag - self._before.lag) / SECOND,
+            'step time p50, us': p50,
+            'step time p99, us': p99,
+            'step time max, us': largest,
+            'lateness p99, us': late99,
+            'lateness max, us': latest,
+            'behind the clock, s': late,
+            'requests in the last second': self.requests_served,
+            'time taken by requests, fraction': self.requests_share,
+            'scheduling': scheduling,
+        }
+        return Status('pace', level, message, values)
+
+    def _verdict(
+        self, control: RunControl, asked: float, late: float, clock: str
+    ) -> tuple[bytes, str]:
+        """Level and message of the pace: what is wrong first."""
+        running = control.state is RunState.RUNNING
+        wrong = (
+            (bool(clock), clock),
+            (self.behind, 'behind: simulated time was given up'),
+            (self.requests_share > FLOOD, 'flooded: requests take much of the time'),
+            (running and late > _LATE, 'catching up'),
+        )
+        for holds, message in wrong:
+            if holds:
+                return WARN, message
+        if not running:
+            return OK, control.state.value
+        return OK, 'as fast as possible' if asked == 0.0 else 'keeping up'
+
+    def cutting(self, control: RunControl, lathe: VirtualLathe) -> Status:
+        """The status of the cut."""
+        made = self.ticks - self._before.ticks
+        ticks = max(1, made)
+        cut = lathe.cut
+        values = {
+            'simulated time, s': lathe.time,
+            'bearing contact': cut.bearing_contact.value,
+            'bearing engaged, fraction of ticks': self._engaged / ticks,
+            'tool in cut, fraction of ticks': self._in_cut / ticks,
+            'guard': control.ended_because or 'not tripped',
+            'spindle speed, rev/min': cut.spindle_speed_rpm,
+            'depth of cut, m': cut.depth_of_cut,
+            'bearing clearance, m': cut.bearing_clearance,
+            'resets': control.resets,
+        }
+        if control.ended_because:
+            return Status('cut', ERROR, control.ended_because, values)
+        message = 'cutting'
+        if not made:
+            message = 'at rest'
+        elif not cut.depth_of_cut:
+            message = 'no depth of cut'
+        elif not self._in_cut:
+            message = 'out of the cut'
+        return Status('cut', OK, message, values)

@@ -1,0 +1,77 @@
+"""What a lathe watches of the graph: a /clock that it follows, and others on its topic."""
+
+from __future__ import annotations
+
+import time
+
+from rclpy.node import Node
+
+from lathe_chatter.nodes.bounded_log import BoundedLog
+from lathe_chatter.nodes.diagnostics import OK, WARN, Status
+from lathe_chatter.nodes.polled_subscription import publisher_names
+from lathe_chatter.nodes.real_time_loop import SECOND
+
+_CLOCK_STOPPED = 2.0
+"""s after which a /clock that shows the same time stands still."""
+
+
+class ClockWatch:
+    """Says when a /clock stands still, and when it goes on.
+
+    Args:
+        log: Of the node.
+
+    Attributes:
+        stands: Whether it stands still.
+    """
+
+    def __init__(self, log: BoundedLog) -> None:
+        """Nothing is seen yet."""
+        self._log, self.stands = log, False
+        self._shown, self._since = 0, 0.0
+
+    def look(self, now: int) -> None:
+        """Look at the time that it shows, ns; called once a second."""
+        at, before = time.monotonic(), self.stands
+        if now != self._shown:
+            self._shown, self._since = now, at
+        self.stands = bool(now) and at - self._since >= _CLOCK_STOPPED
+        if self.stands and not before:
+            self._log.warning(
+                f'/clock stands still at {now / SECOND:.3f} s, and the cut with it.',
+                'clock stands',
+            )
+        elif before and not self.stands:
+            self._log.info(f'/clock goes on at {now / SECOND:.3f} s.', 'clock goes on')
+
+
+class PublisherWatch:
+    """Says who else publishes samples on the topic of a lathe.
+
+    Args:
+        node: The lathe.
+        log: Of it.
+    """
+
+    def __init__(self, node: Node, log: BoundedLog) -> None:
+        """Nobody is seen yet."""
+        self._node, self._log = node, log
+        self._names: list[str] = []
+
+    def look(self) -> None:
+        """See who is there, and say it once; called once a second."""
+        before, self._names = self._names, publisher_names(self._node, '~/samples')
+        if len(self._names) > max(1, len(before)):
+            self._log.warning(
+                f'I am not the only one that publishes '
+                f'{self._node.resolve_topic_name("~/samples")}: {" and ".join(self._names)} do, '
+                'and readers cannot tell them apart.',
+                'publishers',
+            )
+
+    def status(self, readers: int) -> Status:
+        """Whether the samples on the topic are all of this node."""
+        values = {'publishers': ', '.join(self._names), 'readers': readers}
+        if len(self._names) > 1:
+            return Status('samples', WARN, 'not the only lathe on the topic', values)
+        return Status('samples', OK, 'published', values)

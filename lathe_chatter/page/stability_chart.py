@@ -1,0 +1,75 @@
+"""The stability chart of a lathe as a page draws it, from the lathe's own parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.lathe_parameters import cut_from, described_by, machine_from
+from lathe_chatter.model.machine_file import MachineDescription
+from lathe_chatter.page.shared_state import finite
+from lathe_chatter.report.stability_chart import (
+    chart_limits,
+    chart_speeds,
+    top_of_chart,
+    usual_speeds,
+)
+from lathe_chatter.stability.probability import stability_probability
+
+LIMITS = ('depth_of_cut', 'open_limit', 'seated_limit', 'seating_line')
+_PROBABILITIES = (0.95, 0.5, 0.05)
+_MACHINES, _SPEEDS = 400, 120
+_MATTERS_NOT = ('spindle_speed_rpm', 'depth_of_cut', 'real_time_factor', 'seed')
+_NOISE = ('noise', 'runout', 'variation', 'unbalance')
+
+
+def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a lathe's parameters its chart depends on, and perhaps some that it does not."""
+    return {
+        name: value
+        for name, value in values.items()
+        if name not in _MATTERS_NOT and not any(word in name for word in _NOISE)
+    }
+
+
+def stability_chart(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The chart of a lathe from its parameters, see `draw_chart`.
+
+    Raises:
+        LatheChatterError: If the parameters describe no machine.
+    """
+    known = {name: value for name, value in values.items() if value is not None}
+    leaves = bool(known.get('tool_leaves_cut', True))
+    described = described_by(known)
+    return draw_chart(machine_from(known), cut_from(known), described, tool_leaves_cut=leaves)
+
+
+def draw_chart(
+    machine: Machine, cut: Cut, described: MachineDescription | None, *, tool_leaves_cut: bool
+) -> dict[str, Any]:
+    """The limits over the speeds of a spindle, SI and rev/min; no limit is null.
+
+    Where the machine is known with errors, the depths that are stable with some probabilities
+    too.
+    """
+    spindle = described.speed_range if described else None
+    low, high = spindle or usual_speeds(machine, cut)
+    speeds = chart_speeds(low, high)
+    limits = chart_limits(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut)
+    found: dict[str, Any] = {name: finite(getattr(limits, name)) for name in LIMITS}
+    found['speed'] = limits.spindle_speed_rpm.tolist()
+    found['contact'] = cut.bearing_contact.value
+    found['top'] = top_of_chart(cut, limits)
+    if described is not None and described.uncertainty:
+        speeds = chart_speeds(low, high, _SPEEDS)
+        probable = stability_probability(
+            machine, described.uncertainty, cut, speeds, machines=_MACHINES,
+            tool_leaves_cut=tool_leaves_cut,
+        )  # fmt: skip
+        for share in _PROBABILITIES:
+            depth = np.interp(found['speed'], speeds, probable.safe_depth(share))
+            found[f'stable_{share:.0%}'] = finite(depth)
+    return found

@@ -1,0 +1,130 @@
+"""Results that are kept in a file as they are found, so that what was interrupted goes on.
+
+The file is text, a JSON object in each line: first what the results are of, then one for each
+as it is found. An interruption loses what was in progress and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import closing, nullcontext, suppress
+from pathlib import Path
+from typing import Any
+
+from lathe_chatter.errors import ResultFileError, reason_of
+from lathe_chatter.executors import Item, Result, batches_of, run_batches
+from lathe_chatter.fingerprint import code_identity
+
+
+class ResultFile:
+    """A file that is begun or continued; what it is written is in it at once.
+
+    Args:
+        path: Of the file.
+        header: What the results are of; a file with another one is refused.
+
+    Attributes:
+        entries: What it held already.
+
+    Raises:
+        ResultFileError: If it holds something else, or cannot be written.
+    """
+
+    def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
+        """See the class."""
+        self._path = path
+        self.entries: list[dict[str, Any]] = []
+        try:
+            whole = path.read_bytes() if path.exists() else b''
+            whole = whole[: whole.rfind(b'\n') + 1]
+            if whole:
+                self.entries = self._known(whole, json.loads(_line(header)))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open('r+b' if path.exists() else 'wb')
+            self._file.truncate(len(whole))  # a last line that was cut off
+            self._file.seek(len(whole))
+            if not whole:
+                self._file.write(_line(header))
+                self._file.flush()
+        except OSError as error:
+            raise self._not_written(error) from None
+
+    def _known(self, whole: bytes, header: Mapping[str, Any]) -> list[dict[str, Any]]:
+        try:
+            found, *entries = map(json.loads, whole.splitlines())
+            other = [name for name, value in header.items() if found.get(name) != value]
+        except (ValueError, AttributeError):
+            found, entries, other = {}, [], ['kind']
+        if other == ['code'] and 'code' in found:
+            reason = f'was begun with {found["code"]}, and this is {header["code"]}'
+            raise ResultFileError(f'{self._path} {reason}: go on with that, or name another.')
+        if other:
+            reason = f'holds other results, not of the same {other[0]}'
+            raise ResultFileError(f'{self._path} {reason}: name another, or remove it.')
+        return entries
+
+    def add(self, entry: Mapping[str, Any]) -> None:
+        """Keep one more.
+
+        Raises:
+            ResultFileError: If it cannot be written.
+        """
+        try:
+            self._file.write(_line(entry))
+            self._file.flush()
+        except OSError as error:
+            raise self._not_written(error) from None
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with suppress(OSError):  # it tries again to write what `add` could not
+            self._file.close()
+
+    def _not_written(self, error: OSError) -> ResultFileError:
+        return ResultFileError(f'{self._path} cannot be written: {reason_of(error)}.')
+
+
+def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
+    path: Path | None,
+    header: Mapping[str, Any],
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    executor: Executor | None = None,
+    progress: Callable[[int], object] = lambda _count: None,
+) -> list[Result]:
+    """`executors.spread`, of results that JSON can hold, kept in a file and continued from it.
+
+    Args:
+        path: Of the file; None keeps nothing.
+        header: What the results are of; the version of the code is added.
+        function: Of one item.
+        items: What it is called with.
+        executor: Where.
+        progress: Is told, now and then, how many more are done.
+
+    Raises:
+        ResultFileError: If the file is of something else, or cannot be written.
+        WorkerError: If workers are lost, or have another version.
+    """
+    file = ResultFile(path, {**header, 'code': code_identity()}) if path else None
+    with closing(file) if file else nullcontext():
+        found = {e['place']: e['result'] for e in (file.entries if file else ())}
+        if found:
+            progress(len(found))
+        missing = [k for k in range(len(items)) if k not in found]
+        batches = batches_of(missing, executor)
+        wanted = ([items[k] for k in batch] for batch in batches)
+        for done in run_batches(function, wanted, executor=executor):
+            for place, result in zip(batches[done.place], done.results, strict=True):
+                found[place] = result
+                if file:
+                    file.add({'place': place, 'result': result})
+            progress(len(done.results))
+    return [found[k] for k in range(len(items))]
+
+
+def _line(values: Mapping[str, Any]) -> bytes:
+    return json.dumps(values).encode() + b'\n'

@@ -1,0 +1,245 @@
+"""A measured frequency response, and the files in which shops keep it.
+
+Universal files (dataset 58, text and binary, function type 4, with their coherence of type 6)
+say themselves what was measured over what, and in which units. A CSV says it in its head:
+
+    frequency (Hz), real (m/s2/N), imaginary (m/s2/N), coherence
+
+or with `magnitude` and `phase (deg)` in place of the two parts. Whatever was measured
+(receptance m/N, mobility m/s/N, accelerance m/s2/N) is kept as measured, for there its noise is
+even; the modes are fitted to it with the factor that makes it of a receptance.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lathe_chatter.array_types import Array
+from lathe_chatter.errors import FrequencyResponseError, reason_of
+
+Complex = NDArray[np.complex128]
+
+ORDERS = {'receptance': 0, 'mobility': 1, 'accelerance': 2}
+"""How often the displacement was differentiated in what was measured."""
+
+_G = 9.80665
+_LENGTHS = {'m': 1.0, 'mm': 1e-3, 'um': 1e-6, 'µm': 1e-6, 'in': 0.0254}
+_FORCES = {'n': 1.0, 'kn': 1e3, 'lbf': 4.4482216152605}
+_UFF_ORDERS = {8: 0, 11: 1, 12: 2}
+"""Specific data types of dataset 58: displacement, velocity, acceleration."""
+_UFF_FORCE, _UFF_FRF, _UFF_COHERENCE = 13, 4, 6
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """One measured frequency response of a body, at the point where it is cut.
+
+    Attributes:
+        frequency: Ascending, Hz (n,).
+        response: As measured, m/N, m/s/N or m/s2/N (n,).
+        form: `receptance`, `mobility` or `accelerance`.
+        coherence: Between 0 and 1 (n,), None where the file has none.
+        source: The file, for people.
+    """
+
+    frequency: Array
+    response: Complex = field(repr=False)
+    form: str
+    coherence: Array | None = field(default=None, repr=False)
+    source: str = ''
+
+    def __post_init__(self) -> None:
+        """Validate.
+
+        Raises:
+            FrequencyResponseError: If lengths differ, values are not finite, or too few.
+        """
+        if self.form not in ORDERS:
+            known = ', '.join(ORDERS)
+            raise FrequencyResponseError(
+                f'{self.source}: form is {self.form!r}: it must be one of {known}.'
+            )
+        parts = [self.frequency, self.response]
+        parts += [self.coherence] if self.coherence is not None else []
+        if len({part.shape for part in parts}) != 1 or self.frequency.ndim != 1:
+            raise FrequencyResponseError(f'{self.source}: its columns are not of one length.')
+        if not all(np.isfinite(part).all() for part in parts):
+            raise FrequencyResponseError(f'{self.source}: it holds values that are not finite.')
+        if self.frequency.size < 16 or np.any(np.diff(self.frequency) <= 0.0):
+            raise FrequencyResponseError(
+                f'{self.source}: it must hold at least 16 ascending frequencies, '
+                f'and has {self.frequency.size}.'
+            )
+
+    def within(self, lowest: float, highest: float) -> FrequencyResponse:
+        """The same between two frequencies, Hz, and never at 0 Hz, where nothing vibrates."""
+        inside = (self.frequency >= max(lowest, 1e-9)) & (self.frequency <= highest)
+        coherence = None if self.coherence is None else self.coherence[inside]
+        return FrequencyResponse(
+            self.frequency[inside], self.response[inside], self.form, coherence, self.source
+        )
+
+    @property
+    def of_receptance(self) -> Complex:
+        """What a receptance is multiplied by to give what was measured: (i omega)^order (n,)."""
+        factor = (2j * np.pi * self.frequency) ** ORDERS[self.form]
+        return factor.astype(np.complex128)
+
+
+def read_frequency_responses(path: Path | str) -> list[FrequencyResponse]:
+    """The frequency responses in a file, universal or CSV.
+
+    Args:
+        path: Ending in .uff, .unv or .bunv for a universal file; any other is read as CSV.
+
+    Raises:
+        FrequencyResponseError: If it cannot be read, or holds none.
+    """
+    path = Path(path)
+    try:
+        with path.open('rb') as file:
+            head = file.read(64)
+    except OSError as error:
+        raise FrequencyResponseError(f'{path} cannot be read: {reason_of(error)}.') from None
+    universal = path.suffix.lower() in {'.uff', '.unv', '.bunv', '.uf'} or re.match(
+        rb'\s*-1\s*\r?\n\s*\d+', head
+    )
+    found = list(_universal(path) if universal else _csv(path))
+    if not found:
+        raise FrequencyResponseError(f'{path} holds no frequency response.')
+    return found
+
+
+def _universal(path: Path) -> Iterator[FrequencyResponse]:
+    """Those of a universal file, each with the coherence of the same two points."""
+    try:
+        import pyuff
+    except ImportError:
+        raise FrequencyResponseError(
+            "Universal files need the package pyuff: pip install 'lathe_chatter[identify]'."
+        ) from None
+    try:
+        sets: Any = pyuff.UFF(str(path)).read_sets()
+    except Exception as error:  # noqa: BLE001 -- pyuff raises whatever a broken file makes it
+        raise FrequencyResponseError(f'{path} is no sound universal file: {error}.') from None
+    sets = [sets] if isinstance(sets, dict) else sets
+    functions = [entry for entry in sets if entry.get('type') == 58]
+    coherences = {_points(e): e for e in functions if e['func_type'] == _UFF_COHERENCE}
+    for entry in functions:
+        if entry['func_type'] != _UFF_FRF:
+            continue
+        order = _UFF_ORDERS.get(entry.get('ordinate_spec_data_type'))
+        over = entry.get('orddenom_spec_data_type', _UFF_FORCE)
+        unit, below = (
+            text if text.upper() != 'NONE' else ''
+            for text in (
+                str(entry.get(f'{part}_axis_units_lab') or '').strip()
+                for part in ('ordinate', 'orddenom')
+            )
+        )
+        if over not in {_UFF_FORCE, 0} or (order is None and not unit):
+            raise FrequencyResponseError(
+                f'{path}: a function is not said to be displacement, velocity or acceleration '
+                'over force.'
+            )
+        unit = unit or ('m', 'm/s', 'm/s2')[order or 0]
+        below = below or 'N'
+        form, scale = _unit(unit if '/' in unit and _over_force(unit) else f'{unit}/{below}', path)
+        if order is not None and ORDERS[form] != order:
+            raise FrequencyResponseError(
+                f'{path}: a function is said to be {_name(order)} and has the unit {unit}.'
+            )
+        beside = coherences.get(_points(entry))
+        coherence = None if beside is None else np.clip(np.real(beside['data']), 0.0, 1.0)
+        yield FrequencyResponse(
+            np.asarray(entry['x'], float),
+            (np.asarray(entry['data']) * scale).astype(np.complex128),
+            form,
+            coherence,
+            str(path),
+        )
+
+
+def _points(entry: dict[str, Any]) -> tuple[Any, ...]:
+    names = ('rsp_node', 'rsp_dir', 'ref_node', 'ref_dir')
+    return tuple(entry.get(name) for name in names)
+
+
+def _name(order: int) -> str:
+    return next(name for name, value in ORDERS.items() if value == order)
+
+
+def _over_force(unit: str) -> bool:
+    return unit.rpartition('/')[2].strip().lower() in _FORCES
+
+
+def _unit(text: str, path: Path) -> tuple[str, float]:
+    """Form and factor to SI of a unit: `um/N`, `g/N`, `(m/s^2)/lbf`, `(1/N)*(m/s²)`."""
+    # What is no text of UTF-8 was a small two.
+    plain = re.sub(r'[()*·^\s]', '', text.replace('²', '2').replace('\ufffd', '2'))
+    before = re.match(r'1/(kN|N|lbf)(.+?)(?:/N)?$', plain)
+    motion, force = (before[2], before[1]) if before else plain.rpartition('/')[::2]
+    scale = _FORCES.get(force.lower())
+    if motion.lower() in {'g', 'gn'} and scale:
+        return 'accelerance', _G / scale
+    for length, factor in _LENGTHS.items():
+        for order, suffix in enumerate(('', '/s', '/s2')):
+            if motion == length + suffix and scale:
+                return _name(order), factor / scale
+    raise FrequencyResponseError(
+        f'{path}: the unit is {text!r}: it must be a length (m, mm, um, in), such a length /s or '
+        '/s2, or g, over a force (N, kN, lbf).'
+    )
+
+
+def _csv(path: Path) -> Iterator[FrequencyResponse]:
+    """That of a CSV whose head names the columns and their units."""
+    text = path.read_text(encoding='utf-8-sig', errors='replace')
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
+    if not lines:
+        raise FrequencyResponseError(f'{path} is empty.')
+    separator = next((mark for mark in (';', '\t', ',') if mark in lines[0]), ',')
+    rows = list(csv.reader(io.StringIO('\n'.join(lines)), delimiter=separator))
+    columns: dict[str, int] = {}
+    units: dict[str, str] = {}
+    for k, cell in enumerate(rows[0]):
+        match = re.match(r'^\s*(\w+)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*$', cell)
+        name = match[1].lower() if match else ''
+        name = next((known for known in _COLUMNS if name and known.startswith(name)), name)
+        columns[name], units[name] = k, (match[2] or '' if match else '')
+    parts = ('real', 'imaginary') if 'real' in columns else ('magnitude', 'phase')
+    for name in ('frequency', *parts):
+        if name not in columns:
+            raise FrequencyResponseError(
+                f'{path}: its head must name frequency, and real and imaginary or magnitude and '
+                f'phase, and has no {name}.'
+            )
+    try:
+        table = np.array([[float(c.replace(',', '.')) for c in row] for row in rows[1:]])
+    except ValueError as error:
+        raise FrequencyResponseError(f'{path}: {error}.') from None
+    form, scale = _unit(units[parts[0]] or '-', path)
+    first, second = (table[:, columns[name]] for name in parts)
+    if parts[0] == 'magnitude':
+        turn = 1.0 if units['phase'].lower().startswith('rad') else np.pi / 180.0
+        response = first * np.exp(1j * turn * second)
+    else:
+        response = first + 1j * second
+    frequency = table[:, columns['frequency']]
+    if units['frequency'] == 'rad/s':
+        frequency = frequency / (2.0 * np.pi)
+    coherence = table[:, columns['coherence']] if 'coherence' in columns else None
+    measured = (response * scale).astype(np.complex128)
+    yield FrequencyResponse(frequency, measured, form, coherence, str(path))
+
+
+_COLUMNS = ('frequency', 'real', 'imaginary', 'magnitude', 'phase', 'coherence')

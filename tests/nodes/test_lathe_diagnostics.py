@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import Cut as ModelCut
+from lathe_chatter.nodes.lathe_diagnostics import Durations, TickStatistics
+from lathe_chatter.nodes.real_time_loop import Pacer, RequestLoad
+from lathe_chatter.nodes.simulation_control import RunControl
+
+TICK = 2_000_000
+
+
+def test_quantiles_are_those_of_the_latest() -> None:
+    durations = Durations()
+    assert durations.quantiles(0.5, 1.0) == (0.0, 0.0)
+    for value in range(10_000):
+        durations.add(value)
+    assert durations.quantiles(0.0, 1.0) == (10_000 - 4096, 9999)
+    durations.clear()
+    durations.add(3.0)
+    assert durations.quantiles(0.5) == (3.0,)
+
+
+class Cut:
+    """Statistics of a lathe at the beginning of a second."""
+
+    def __init__(self, lathe: VirtualLathe) -> None:
+        self.lathe, self.control, self.pacer = lathe, RunControl(), Pacer(TICK)
+        self.requests = RequestLoad()
+        self.statistics = TickStatistics(self.pacer, TICK, self.requests)
+
+    def tick(self) -> None:
+        self.lathe.advance(20)
+        self.statistics.note_tick(0, self.lathe)
+
+    @property
+    def cutting(self) -> str:
+        return self.statistics.cutting(self.control, self.lathe).message
+
+    def pace(self, asked: float = 1.0, late: float = 0.0, clock: str = '') -> str:
+        return self.statistics.pace(
+            self.control, asked=asked, late=late, clock=clock, scheduling=''
+        ).message
+
+
+def test_the_verdict_on_the_pace_says_what_is_wrong_first() -> None:
+    cut = Cut(VirtualLathe())
+    assert cut.pace() == 'keeping up'
+    assert cut.pace(asked=0.0) == 'as fast as possible'
+    assert cut.pace(late=0.5) == 'catching up'
+    assert cut.pace(clock='/clock stands still', late=0.5) == '/clock stands still'
+    cut.control.pause(pause=True)
+    assert cut.pace() == 'paused'
+    assert cut.pace(late=0.5) == 'paused'
+    cut.requests.taken = 10**12
+    assert cut.pace() == 'flooded: requests take much of the time'
+    cut.pacer.start(0)
+    cut.pacer.due(100 * TICK)
+    assert cut.pace(late=0.5) == 'behind: simulated time was given up'
+    cut.statistics.begin_second()
+    assert cut.pace() == 'paused'
+
+
+def test_the_status_of_the_cut_claims_no_more_than_the_ticks_showed() -> None:
+    cut = Cut(VirtualLathe())
+    assert cut.cutting == 'at rest'
+    cut.tick()
+    assert cut.cutting == 'cutting'
+    cut.statistics.begin_second()
+    assert cut.cutting == 'at rest'
+    out = Cut(VirtualLathe(cut=ModelCut(feed_speed=0.0)))
+    out.lathe.knock(-1.0)  # away from the workpiece
+    out.tick()
+    assert out.cutting == ('cutting' if out.lathe.tool_in_cut else 'out of the cut')
+    assert not out.lathe.tool_in_cut
+    none = Cut(VirtualLathe(cut=ModelCut(depth_of_cut=0.0)))
+    none.tick()
+    assert none.cutting == 'no depth of cut'

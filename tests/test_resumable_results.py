@@ -1,0 +1,89 @@
+"""Results in a file: kept as they are found, continued, and never mixed."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from lathe_chatter import resumable_results
+from lathe_chatter.errors import ResultFileError
+from lathe_chatter.resumable_results import ResultFile, spread_into
+
+HEADER = {'kind': 'squares', 'speeds': [1.0, 2.0]}
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def test_what_was_interrupted_is_not_computed_again(tmp_path: Path) -> None:
+    path, seen = tmp_path / 'a.jsonl', list[int]()
+
+    def interrupted(number: int, end: int) -> int:
+        seen.append(number)
+        if len(seen) == end:
+            raise KeyboardInterrupt
+        return square(number)
+
+    with ThreadPoolExecutor(1) as pool:
+        with pytest.raises(KeyboardInterrupt):
+            spread_into(path, HEADER, partial(interrupted, end=37), range(40), executor=pool)
+        with path.open('ab') as file:
+            file.write(b'{"place": 39, "res')  # as a power cut leaves it
+        kept = path.read_bytes().count(b'\n') - 1
+        assert 0 < kept < 37
+        seen.clear()
+        told: list[int] = []
+        found = spread_into(
+            path, HEADER, partial(interrupted, end=99), range(40), executor=pool,
+            progress=told.append,
+        )  # fmt: skip
+    assert found == [square(number) for number in range(40)]
+    assert len(seen) == 40 - kept
+    assert (told[0], sum(told)) == (kept, 40)
+
+
+def test_other_results_are_left_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / 'a.jsonl'
+    spread_into(path, HEADER, square, range(3))
+    before = path.read_bytes()
+    with pytest.raises(ResultFileError, match='holds other results, not of the same speeds: '):
+        spread_into(path, {**HEADER, 'speeds': [1.0]}, square, range(3))
+    monkeypatch.setattr(resumable_results, 'code_identity', lambda: 'lathe_chatter 9.9.9')
+    with pytest.raises(ResultFileError, match=r'was begun with .* and this is lathe_chatter 9'):
+        spread_into(path, HEADER, square, range(3))
+    assert path.read_bytes() == before
+    for content in (b'time,x\n0,1\n', b'[]\n', b'\xff\xfe\n'):
+        path.write_bytes(content)
+        with pytest.raises(ResultFileError, match='not of the same kind'):
+            ResultFile(path, HEADER)
+        assert path.read_bytes() == content
+
+
+@contextmanager
+def room_for(size: int) -> Iterator[None]:
+    """No file may grow beyond some bytes: the system then refuses, as on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_disk_that_takes_no_more_is_a_sentence_and_loses_nothing(tmp_path: Path) -> None:
+    path = tmp_path / 'a.jsonl'
+    with room_for(1000), pytest.raises(ResultFileError, match=r'a\.jsonl cannot be written: '):
+        spread_into(path, HEADER, square, range(100))
+    kept = path.read_bytes()
+    assert 500 < len(kept) <= 1000
+    assert spread_into(path, HEADER, square, range(100)) == [square(k) for k in range(100)]
+    assert path.read_bytes().startswith(kept[: kept.rfind(b'\n') + 1])
