@@ -51,7 +51,7 @@ RECOVERED = 'lathe_chatter/recovered'
 """Name of the record of a run that was recovered: from which, and what could not be read."""
 
 _CORE = (
-    'arrays.py',
+    'array_types.py',
     'compiled.py',
     'lathe/doubts.py',
     'lathe/integrator/*.py',
