@@ -1,5 +1,5 @@
 # Two commands are all there is to know: `make run` and `make test`. Both install what they need.
-.PHONY: help run page test test-core test-kilted lint docs figures everywhere bounds lock clean
+.PHONY: help run page test test-core test-kilted lint docs figures everywhere bounds soak lock clean
 .DEFAULT_GOAL := help
 
 # Nodes of this checkout talk on this machine only, unless the user has said otherwise.
