@@ -24,6 +24,8 @@ EXECUTABLES = {
     'operator_page',
     *('cell', 'lathe-chatter'),
 }
+PART_OF = {'llvmlite': 'numba'}
+"""What comes with another package, which names the version that it needs."""
 OPTIONAL_IN_ROS = {'simulation_interfaces'}
 """Used where they are; no machine needs them."""
 NAMED_OTHERWISE = {'sdypy': 'sdypy-EMA'}
@@ -97,7 +99,7 @@ def test_every_import_is_declared_in_setup_and_in_package_xml() -> None:
     in_setup = declared_in_setup()
     providers = packages_distributions()
     lacking = []
-    for name in imported_packages() - OPTIONAL_IN_ROS:
+    for name in {PART_OF.get(name, name) for name in imported_packages() - OPTIONAL_IN_ROS}:
         if name in keys:  # a package of ROS 2, which the package index has no name for
             continue
         found = {

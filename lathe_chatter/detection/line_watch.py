@@ -65,7 +65,8 @@ class LineWatch:
             now = judge.state.now[0]
             if k == best and share > _GONE and self._is_same(self._judges[best].centres[place]):
                 now.line_gone = 0
-            elif now.alarmed:
+            elif now.alarmed and judge.line_known(int(powers[k].argmax())):
+                # An alarm from other sensors stands until it is known that there is no line.
                 now.line_gone += 1
                 if now.line_gone >= _LOOKS_GONE:
                     judge.end_alarm()

@@ -40,7 +40,7 @@ class Shop:
         self.log: list[Log] = bench.listen_first(Log, '/rosout', LATCHED)
 
     def monitor(self, **parameters: Any) -> MonitorNode:
-        node: MonitorNode = self.start(MonitorNode, **{'model': 'lathe_parameters', **parameters})
+        node: MonitorNode = self.start(MonitorNode, **{'model': 'parameters', **parameters})
         self.flags = self.bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
         return node
 
@@ -164,7 +164,7 @@ def best_effort(shop: Shop) -> None:
     talker = shop.bench.node.create_publisher(Float64MultiArray, '/lathe/samples', qos)
     shop.bench.spin_until(talker.get_subscription_count, 'a subscription that fits')
     shop.send(talker, chatters(0.2))
-    shop.bench.spin_until(lambda: node._continuity.samples > 0, 'output_samples')
+    shop.bench.spin_until(lambda: node._continuity.samples > 0, 'samples')
 
 
 def asks_the_lathe(shop: Shop) -> None:
@@ -245,7 +245,7 @@ def test_every_sentence_has_a_story_and_says_when_it_is_true() -> None:
 def test_a_space_after_the_comma_of_a_label_is_no_part_of_a_name(
     bench: Bench, start: Callable[..., Any]
 ) -> None:
-    node = start(MonitorNode, model='lathe_parameters')
+    node = start(MonitorNode, model='parameters')
     publisher = bench.talk(Float64MultiArray, '/lathe/samples')
     names = [f' {name}' for name in SAMPLE_COLUMNS]
     publisher.publish(encode_block(chatters(0.1), names))
