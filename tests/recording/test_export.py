@@ -121,7 +121,9 @@ def test_an_export_that_fails_leaves_nothing_in_the_way_of_the_next(
     file = folder / 'run_0.mcap'
     whole = file.read_bytes()
     flipped = bytearray(whole)
-    flipped[len(whole) // 2] ^= 1
+    with file.open('rb') as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[-1]
+    flipped[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1  # amid samples
     file.write_bytes(flipped)
     before = sorted(folder.parent.iterdir())
     assert main(['export', str(folder), *form]) == 2
