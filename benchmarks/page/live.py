@@ -183,6 +183,8 @@ def slider(sets: int = 100) -> Iterator[str]:
             listener.spin(
                 lambda k=k: len(changes) > k and listener.ends[-1] > changes[-1], limit=10.0
             )
+            viewer.ask(do='next')  # takes the answer: a viewer that takes none is not served
+            viewer.socket.recv(timeout=_PATIENCE)
         first = np.searchsorted(np.array(listener.ends), np.array(changes), side='right')
         sent = np.array(listener.sent)[first]
         delay = (sent - np.array(asked[: len(sent)])) / 1e6
