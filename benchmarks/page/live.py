@@ -17,6 +17,7 @@ from processes import LATHE, MONITOR, cpu_seconds, resident, running
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from support.browser import Browser
+from support.page_cell import header_of
 from websockets.sync.client import connect
 
 from lathe_chatter.lathe.cut_event_sentences import parse_change
@@ -64,8 +65,7 @@ class Viewer:
             self.ask(do='choose', lathe='/lathe', id=1)
             for _ in range(100):
                 self.ask(do='next')
-                frame = self.socket.recv(timeout=_PATIENCE)
-                header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], 'little')])
+                header = header_of(bytes(self.socket.recv(timeout=_PATIENCE)))
                 if 'lathe_values' in header.get('cell', {}):
                     return
                 if any(not answer['ok'] for answer in header.get('answers', [])):

@@ -27,7 +27,7 @@ class _Member(NamedTuple):
     output: IO[bytes]
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """Ask Linux to end the child should this process be killed: no lathe is left cutting."""
     if sys.platform == 'linux':
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGTERM)
@@ -56,7 +56,7 @@ class ProcessGroup(AbstractContextManager['ProcessGroup']):
             stdout=output,
             stderr=subprocess.STDOUT,
             start_new_session=True,
-            preexec_fn=_die_with_parent,  # noqa: PLW1509 -- no thread is started before
+            preexec_fn=die_with_parent,  # noqa: PLW1509 -- no thread is started before
         )
         self._members.append(_Member(name, process, output))
 

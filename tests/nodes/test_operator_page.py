@@ -5,7 +5,6 @@ from __future__ import annotations
 import http.client
 import http.server
 import json
-import struct
 import sys
 import threading
 import time
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.browser import Browser, chromium
-from support.page_cell import LAMP, PATIENCE, Page, operate
+from support.page_cell import LAMP, PATIENCE, Page, header_of, looking_at, operate
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -40,12 +39,8 @@ def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]: 
 
 @pytest.fixture(scope='module')
 def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
-    browser = Browser(tmp_path_factory.mktemp('profile'))
-    browser.open(page.url())
-    browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
-    browser.until('document.querySelector("#p-depth_of_cut")', 'the controls', PATIENCE)
-    yield browser
-    browser.close()
+    with looking_at(page.url(), tmp_path_factory.mktemp('profile')) as browser:
+        yield browser
 
 
 def until_closed(socket: Any) -> None:
@@ -131,8 +126,7 @@ def test_pause_step_knock_and_recording(page: Page, browser: Browser) -> None:
         'document.querySelector("#notice").textContent.includes("Nothing is kept in memory")',
         'the refusal of the recorder',
     )
-    # Not by a mouse: the notice above may move the button away from under it.
-    browser.run('document.querySelector("[data-call=record_stop]").click()')
+    browser.click('[data-call=record_stop]')
     browser.until('document.querySelector("#recording").textContent.includes("not rec")', 'an end')
     assert (page.folder / 'run' / 'metadata.yaml').exists()
 
@@ -204,8 +198,7 @@ def test_bad_frames_floods_sleepers_and_a_crowd_harm_nobody(page: Page, browser:
     for viewer in crowd[9:]:
         viewer.send('{"do": "next"}')
         frame = viewer.recv(timeout=PATIENCE)
-        (length,) = struct.unpack_from('<I', frame)
-        assert json.loads(frame[4 : 4 + length])['page']['lathes'] == ['/lathe']
+        assert header_of(frame)['page']['lathes'] == ['/lathe']
     before = browser.run('frames')
     browser.until(f'frames > {before} + 20', 'frames', PATIENCE)
     for viewer in crowd:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import struct
 import sys
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from support.browser import Browser, chromium
-from support.page_cell import LAMP, PATIENCE, Page, operate
+from support.page_cell import LAMP, PATIENCE, Page, header_of, looking_at, operate
 from websockets.sync.client import connect
 
 if chromium() is None:
@@ -34,12 +33,9 @@ def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]: 
 
 @pytest.fixture(scope='module')
 def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
-    browser = Browser(tmp_path_factory.mktemp('profile'))
-    browser.open(f'{page.url()}#token={TOKEN.replace(" ", "%20")}')
-    browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
-    browser.until('document.querySelector("#p-depth_of_cut")', 'the controls', PATIENCE)
-    yield browser
-    browser.close()
+    url = f'{page.url()}#token={TOKEN.replace(" ", "%20")}'
+    with looking_at(url, tmp_path_factory.mktemp('profile')) as browser:
+        yield browser
 
 
 def answer_to(socket: Any, **wish: Any) -> dict[str, Any]:
@@ -47,9 +43,7 @@ def answer_to(socket: Any, **wish: Any) -> dict[str, Any]:
     socket.send(json.dumps({**wish, 'id': 7}))
     while True:
         socket.send('{"do": "next"}')
-        frame = socket.recv(timeout=PATIENCE)
-        (length,) = struct.unpack_from('<I', frame)
-        for answer in json.loads(frame[4 : 4 + length]).get('answers', []):
+        for answer in header_of(socket.recv(timeout=PATIENCE)).get('answers', []):
             if answer['id'] == 7:
                 return dict(answer)
 

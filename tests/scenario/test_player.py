@@ -37,7 +37,7 @@ def test_a_step_accepts_what_a_supervisor_has_asked() -> None:
     player = player_of(accepts)
     flag(player, 1.0, up=True)
     assert player.due(3.0, 3500.0) is None
-    player.hear(ASKED, 3.2)
+    player.notice(ASKED, 3.2)
     assert player.due(3.6, 3500.0) is None
     assert player.due(3.8, 3500.0) == accepts
     assert flag(player, 4.0, up=False) == 'flag cleared'

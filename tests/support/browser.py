@@ -110,7 +110,7 @@ class Browser:
     def until(self, script: str, what: str, patience: float = PATIENCE) -> Any:
         """Wait until an expression is true; its value."""
         until = time.monotonic() + patience
-        plain = f'(v => v instanceof Element ? v.outerHTML : v)({script})'
+        plain = f'(async v => (v = await v) instanceof Element ? v.outerHTML : v)({script})'
         while not (value := self.run(plain)):
             assert time.monotonic() < until, f'{what} did not come: {self.complaints}'
             time.sleep(0.05)
@@ -121,11 +121,16 @@ class Browser:
         return str(self.run(f'document.querySelector({json.dumps(selector)}).innerText'))
 
     def click(self, selector: str) -> None:
-        """Click an element, by a mouse."""
-        place = self.run(
-            f'(e => {{ e.scrollIntoView({{block: "center"}}); const r = e.getBoundingClientRect();'
-            f' return [r.x + r.width / 2, r.y + r.height / 2]; }})'
-            f'(document.querySelector({json.dumps(selector)}))'
+        """Click an element, by a mouse, once it lies still under it: what comes above moves it."""
+        place = self.until(
+            f'(async e => {{ e.scrollIntoView({{block: "center"}});'
+            f' const middle = () => {{ const r = e.getBoundingClientRect();'
+            f' return [r.x + r.width / 2, r.y + r.height / 2]; }};'
+            f' const [x, y] = middle(); await new Promise(requestAnimationFrame);'
+            f' await new Promise(requestAnimationFrame); const now = middle();'
+            f' return now[0] === x && now[1] === y && e.contains(document.elementFromPoint(x, y))'
+            f' && now; }})(document.querySelector({json.dumps(selector)}))',
+            f'{selector} under the mouse',
         )
         for kind in ('mousePressed', 'mouseReleased'):
             self.command(

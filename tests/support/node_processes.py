@@ -17,6 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray
 
 import lathe_chatter
+from lathe_chatter.nodes.node_processes import die_with_parent
 from lathe_chatter.samples.codec import SampleDecoder
 from support.node_bench import LATCHED, Bench
 
@@ -58,6 +59,7 @@ class NodeProcesses:
                 stderr=subprocess.STDOUT,
                 cwd=self.folder,
                 env=self._environment,
+                preexec_fn=die_with_parent,  # noqa: PLW1509 -- only the main thread starts any
             )
         self.started.append(process)
         self._running[name] = process

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import signal
+import struct
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +41,23 @@ class Page:
             assert time.monotonic() < until, self.nodes.said()
             time.sleep(0.1)
         return str(found[-1])
+
+
+@contextmanager
+def looking_at(url: str, profile: Path) -> Iterator[Browser]:
+    """A browser with the page of a lathe that cuts."""
+    browser = Browser(profile)
+    browser.open(url)
+    browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
+    browser.until('document.querySelector("#p-depth_of_cut")', 'the controls', PATIENCE)
+    yield browser
+    browser.close()
+
+
+def header_of(frame: bytes) -> dict[str, Any]:
+    """What a frame of the page begins with: its length in four bytes, then JSON."""
+    (length,) = struct.unpack_from('<I', frame)
+    return dict(json.loads(frame[4 : 4 + length]))
 
 
 def operate(browser: Browser) -> None:
