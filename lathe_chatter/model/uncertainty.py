@@ -156,6 +156,17 @@ class Uncertainty:
         )
 
 
+_QUANTITIES = {
+    'frequency': 0,
+    'damping': 1,
+    'damping_ratio': 1,
+    'stiffness': 2,
+    'C': None,
+    'cutting_coefficient': None,
+}
+"""The names that errors are given by: places in `MODAL`; None is C."""
+
+
 def uncertainty_from(text: str, machine: Machine, known: Uncertainty | None = None) -> Uncertainty:
     """Relative standard errors as `frequency=2%,damping=20%,stiffness=5%,C=15%`, for all modes.
 
@@ -167,7 +178,6 @@ def uncertainty_from(text: str, machine: Machine, known: Uncertainty | None = No
     Raises:
         ParameterError: If a name is unknown, or an error no share from 0 to 10.
     """
-    short = {'frequency': 0, 'damping': 1, 'damping_ratio': 1, 'stiffness': 2}
     known = known or Uncertainty()
     for entry in filter(None, (part.strip() for part in text.split(','))):
         name, _, value = (part.strip() for part in entry.partition('='))
@@ -177,14 +187,29 @@ def uncertainty_from(text: str, machine: Machine, known: Uncertainty | None = No
             error = -1.0
         if not 0.0 <= error <= 10.0:
             raise ParameterError(f'--uncertain {name}', value, '', 'a share such as 2% or 0.02')
-        if name in {'C', 'cutting_coefficient'}:
-            known = known.with_error('cutting_coefficient', error)
-        elif name in short:
-            for part in ('tool', 'workpiece'):
-                for k in range(len(getattr(machine, part).modes)):
-                    known = known.with_error(_modal_names(part, k)[short[name]], error)
-        else:
+        if name not in _QUANTITIES:
             raise ParameterError('--uncertain', name, '', 'of frequency, damping, stiffness and C')
+        known = _with_error_everywhere(known, machine, _QUANTITIES[name], error)
+    return known
+
+
+def equally_uncertain(machine: Machine, error: float) -> Uncertainty:
+    """The same relative standard error of C and of every figure of every mode."""
+    known = Uncertainty()
+    for quantity in dict.fromkeys(_QUANTITIES.values()):
+        known = _with_error_everywhere(known, machine, quantity, error)
+    return known
+
+
+def _with_error_everywhere(
+    known: Uncertainty, machine: Machine, quantity: int | None, error: float
+) -> Uncertainty:
+    """With an error of a figure, by its place in `MODAL`, of every mode; None is C."""
+    if quantity is None:
+        return known.with_error('cutting_coefficient', error)
+    for part in ('tool', 'workpiece'):
+        for k in range(len(getattr(machine, part).modes)):
+            known = known.with_error(_modal_names(part, k)[quantity], error)
     return known
 
 

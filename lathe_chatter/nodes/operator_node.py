@@ -97,7 +97,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
     def _on_action(self, message: String) -> None:
         self._log(f'{self.time:7.2f} s  supervisor: {message.data}')
         if ASKS in message.data:
-            self.player.hear(ASKED, self.time)
+            self.player.notice(ASKED, self.time)
 
     def _on_state(self, message: String) -> None:
         self.state = message.data

@@ -162,7 +162,7 @@ class OperatedCell:
     def _on_action(self, message: String) -> None:
         self.board.put('action', message.data)
         if self._player is not None and ASKS in message.data:
-            self._player.hear(ASKED, self._signals.time)
+            self._player.notice(ASKED, self._signals.time)
 
     def add_sentence(self, entry: Mapping[str, Any]) -> None:
         """Show what one of the nodes logged."""

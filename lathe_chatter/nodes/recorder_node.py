@@ -352,9 +352,9 @@ class RecorderNode(ParameterNode):
         for sentence in sentences:
             self.get_logger().info(sentence)
         if last and sentences and '/rosout' in self._topics:
-            self._hear(sentences[-1])
+            self._record_until(sentences[-1])
 
-    def _hear(self, sentence: str) -> None:
+    def _record_until(self, sentence: str) -> None:
         """Record until a sentence of its own has come."""
         self._awaited = sentence.encode()
         until = time.monotonic() + _ECHO

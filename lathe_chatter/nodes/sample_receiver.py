@@ -65,7 +65,7 @@ class SampleSubscription:
             QoSOverridingOptions.with_default_policies(),
         )
 
-    def _offers(self) -> list[TopicEndpointInfo]:
+    def _endpoints(self) -> list[TopicEndpointInfo]:
         found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(
             self._node.resolve_topic_name(_TOPIC)
         )
@@ -81,12 +81,14 @@ class SampleSubscription:
 
     def publishers(self) -> list[str]:
         """Full names of the nodes that publish, sorted; one that does so twice stands twice."""
-        names = [f'{o.node_namespace.rstrip("/")}/{o.node_name}' for o in self._offers()]
+        names = [
+            f'{each.node_namespace.rstrip("/")}/{each.node_name}' for each in self._endpoints()
+        ]
         return sorted(names)
 
     def adapt(self) -> bool:
         """Ask for no more than every publisher offers; whether that made a difference."""
-        offered = {offer.qos_profile.reliability for offer in self._offers()}
+        offered = {each.qos_profile.reliability for each in self._endpoints()}
         if self.best_effort or ReliabilityPolicy.BEST_EFFORT not in offered:
             return False
         self._waiting += self._read()

@@ -41,7 +41,7 @@ class ScenarioPlayer:
         at = self._steps[0].at if self._steps else None
         return math.inf if at is None else at
 
-    def hear(self, word: str, time: float) -> None:
+    def notice(self, word: str, time: float) -> None:
         """Take notice of a word that steps wait for, at a simulated time, s."""
         self.said.append(word)
         self._said_at = time
@@ -61,7 +61,7 @@ class ScenarioPlayer:
         if up == self._is_up:
             return ''
         self._is_up = up
-        self.hear(FLAGGED if up else CLEARED, time)
+        self.notice(FLAGGED if up else CLEARED, time)
         if not up:
             return 'flag cleared'
         figures = [f'{frequency:.1f} Hz'] if math.isfinite(frequency) else []

@@ -92,7 +92,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
         simulation = _Simulation(lathe, run, scenario, knocks, tell)
         if monitor:
             simulation.watch(_detector_for(config, scenario))
-        simulation.tell_doubts()
+        simulation.log_doubts()
         while simulation.play_block():
             progress(lathe.time)
     said = simulation.player.said
@@ -174,7 +174,7 @@ class _Simulation:
 
     # -- acting ----------------------------------------------------------------------------
 
-    def tell_doubts(self) -> None:
+    def log_doubts(self) -> None:
         """Why the samples may not be what was meant; each sentence once."""
         for sentence in self._lathe.doubts:
             if sentence not in self._doubts:
@@ -194,7 +194,7 @@ class _Simulation:
         if sentence:
             self._run.log(sentence)
         self._log(self._lathe.time, str(replace(step, changes=meant)))
-        self.tell_doubts()
+        self.log_doubts()
 
     def _knock(self, impulse: float) -> None:
         self._run.log(knock_sentence(self._lathe.time, impulse))

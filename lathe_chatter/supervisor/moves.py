@@ -18,7 +18,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantities import check_fields, limits_of, quantity
-from lathe_chatter.model.uncertainty import uncertainty_from
+from lathe_chatter.model.uncertainty import equally_uncertain
 from lathe_chatter.stability import (
     ProcessDamping,
     critical_depths,
@@ -170,9 +170,7 @@ def may_be(machine: Machine, error: float) -> list[Machine]:
         machine: As told.
         error: Relative standard error of every figure of it.
     """
-    names = ('frequency', 'damping', 'stiffness', 'C')
-    uncertainty = uncertainty_from(','.join(f'{name}={error!r}' for name in names), machine)
-    drawn, _ = uncertainty.draw(machine, _MACHINES - 1 if error else 0)
+    drawn, _ = equally_uncertain(machine, error).draw(machine, _MACHINES - 1 if error else 0)
     parts = np.exp(error * np.random.default_rng(1).standard_normal(len(drawn)))
     return [machine, *(_carried(each, part) for each, part in zip(drawn, parts, strict=True))]
 
@@ -213,14 +211,14 @@ def moves_for(
     for odd in _ODD:
         if passable or odd >= len(machines):
             return
-        found = [offer for search in searches for offer in search.constant_speeds(odd)]
-        if not any(removal_rate(o.cut) > _NEARLY_ALL * removal_rate(cut) for o in found):
+        found = [each for search in searches for each in search.constant_speeds(odd)]
+        if not any(removal_rate(each.cut) > _NEARLY_ALL * removal_rate(cut) for each in found):
             for search in searches:
                 found += [*search.smaller_feeds(odd), *search.varied_speeds(odd)]
-        for offer in sorted(found, key=lambda offer: -offer.worth):
-            if amplitude * offer.search.rise(offer.cut) <= limits.amplitude_limit:
+        for each in sorted(found, key=lambda each: -each.worth):
+            if amplitude * each.search.rise(each.cut) <= limits.amplitude_limit:
                 passable = True
-                yield offer.search.move(offer.cut, 1.0 - odd / len(machines))
+                yield each.search.move(each.cut, 1.0 - odd / len(machines))
 
 
 def _contacts(cut: Cut) -> list[tuple[tuple[float, ...], int]]:
@@ -236,7 +234,7 @@ def _contacts(cut: Cut) -> list[tuple[tuple[float, ...], int]]:
     return [((0.0, 0.5, 1.0), 0), ((0.0,), -1), ((1.0,), 1)]
 
 
-class _Offer(NamedTuple):
+class _Candidate(NamedTuple):
     """What a cut is worth, the cut, and who has found it."""
 
     worth: float
@@ -283,7 +281,7 @@ class _Search:
         here = values[self._speeds == self._cut.spindle_speed_rpm]
         return float(here[0]) if here.size else math.nan
 
-    def constant_speeds(self, odd: int) -> Iterator[_Offer]:
+    def constant_speeds(self, odd: int) -> Iterator[_Candidate]:
         """Speeds, each with the greatest depth that suits all machines but some."""
         cut, limits = self._cut, self._limits
         shallowest, deepest = self._suits(odd)
@@ -299,18 +297,18 @@ class _Search:
         best = allowed & (worth >= beside[:-2]) & (worth >= beside[2:])
         for k in np.flatnonzero(best).tolist():
             changes = {'spindle_speed_rpm': self._speeds[k], 'depth_of_cut': depth[k]}
-            yield self._offer(worth[k], changes)
+            yield self._candidate(worth[k], changes)
 
-    def smaller_feeds(self, odd: int) -> Iterator[_Offer]:
+    def smaller_feeds(self, odd: int) -> Iterator[_Candidate]:
         """The largest feed at which the mean force leaves the workpiece floating."""
         cut = self._cut
         part = self._at_present(self._line[odd]) / _RESERVE / cut.depth_of_cut
         stable = self._at_present(self._deepest[odd]) >= cut.depth_of_cut
         if self._side < 0 and stable and self._limits.smallest_feed / cut.feed <= part < 1.0:
             name = 'feed_per_revolution' if cut.feed_per_revolution else 'feed_speed'
-            yield self._offer(part * _ONE_CONTACT, {name: part * getattr(cut, name)})
+            yield self._candidate(part * _ONE_CONTACT, {name: part * getattr(cut, name)})
 
-    def varied_speeds(self, odd: int) -> Iterator[_Offer]:
+    def varied_speeds(self, odd: int) -> Iterator[_Candidate]:
         """The largest variations that the spindle can follow, around the present speed."""
         cut, limits, rpm = self._cut, self._limits, self._cut.spindle_speed_rpm
         shallowest, _ = self._suits(odd)
@@ -330,11 +328,13 @@ class _Search:
                     self._growth(number, new) < _SURE_DECAY
                     for number in range(min(_VARIED, len(self._machines)))
                 ):
-                    yield self._offer(_VARYING * (_ONE_CONTACT if self._side else 1.0), changes)
+                    yield self._candidate(
+                        _VARYING * (_ONE_CONTACT if self._side else 1.0), changes
+                    )
 
-    def _offer(self, worth: float, changes: Mapping[str, float]) -> _Offer:
+    def _candidate(self, worth: float, changes: Mapping[str, float]) -> _Candidate:
         numbers = {name: float(value) for name, value in changes.items()}
-        return _Offer(float(worth), self._cut.with_changes(**numbers), self)
+        return _Candidate(float(worth), self._cut.with_changes(**numbers), self)
 
     def move(self, new: Cut, share: float) -> Move:
         """What is predicted of a cut."""

@@ -11,9 +11,6 @@ from lathe_chatter.array_types import Array
 LANES = 8
 """Steps of a block."""
 
-LANES = 8
-"""Steps of a block."""
-
 
 def lanes_at(rows: Array, row: int, column: int) -> Any:
     """The eight numbers of a row that begin at a column."""

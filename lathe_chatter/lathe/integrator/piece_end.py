@@ -23,7 +23,6 @@ DETAIL = 1.5
     DURATION, PLACE_1, AHEAD_1, SPEED_1, ACCELERATION_1,
     HEIGHT_1, SLOPE_1, CURVATURE_1,  # of the surface met there, by place
 ) = range(14)  # fmt: skip
-PIECE_SIZE = 14
 
 
 @compiled(inline=True, borrows=True)

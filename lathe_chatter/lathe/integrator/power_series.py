@@ -37,7 +37,7 @@ class Machine(NamedTuple):
 class Scratch(NamedTuple):
     """Room to work in, so that no piece has to ask for memory."""
 
-    piece: Array  # (PIECE_SIZE,)
+    piece: Array  # by the names of piece_end.py (14,) and more
     end: Array  # coordinates at the end of the piece (2n,)
     other: Array  # coordinates (2n,)
     seen: Array  # what they mean (1, OUTPUTS)
