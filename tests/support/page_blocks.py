@@ -12,13 +12,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lathe_chatter.nodes.node_processes import die_with_parent
+
 ROOT = Path(__file__).resolve().parents[2]
 _BLOCK = re.compile(
     r'(?:<!-- (?P<mark>[^\n]*?) -->\n)?^```(?P<kind>[a-z]+)\n(?P<text>.*?)^```$',
     re.DOTALL | re.MULTILINE,
 )
 _NODE = re.compile(r'^ros2 run lathe_chatter (?!lathe-chatter)')
-_TIMEOUT = 300.0
+_TIMEOUT = 280.0
+"""s: less than that of the test, so that its failure says which command it was."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,9 @@ class Reader:
         """Do one block; an error is the test's."""
         if block.mark == 'ends the nodes':
             self.end()
+        if block.kind == 'python' and block.talks_to_ros:
+            self._check([sys.executable, '-c', block.text], block.text)
+            return
         if block.kind == 'python':
             exec(compile(block.text, '<page>', 'exec'), self._names)  # noqa: S102 -- our own pages
             return
@@ -84,31 +90,50 @@ class Reader:
 
     def end(self) -> None:
         """End the nodes as Ctrl-C would."""
-        for node in self._nodes:
+        ended, self._nodes = self._nodes, []
+        for node in ended:
             node.send_signal(signal.SIGINT)
-        for node in self._nodes:
-            assert node.wait(60.0) == 0
-        self._nodes.clear()
+        try:
+            assert [node.wait(60.0) for node in ended] == [0] * len(ended)
+        finally:
+            for node in ended:
+                node.kill()
 
     def _type(self, command: str, *, fails: bool) -> None:
-        paths = [str(Path(sys.executable).parent), os.environ['PATH']]
-        environment = {**os.environ, 'PATH': os.pathsep.join(paths), 'MPLBACKEND': 'Agg'}
-        environment['PYTHONPATH'] = str(ROOT / 'tests')
         if _NODE.match(command):
             words = _NODE.sub('', command).split()
-            self._nodes.append(subprocess.Popen(words, cwd=self.folder, env=environment))
+            node = subprocess.Popen(
+                words,
+                cwd=self.folder,
+                env=_environment(),
+                preexec_fn=die_with_parent,  # noqa: PLW1509 -- only the main thread starts any
+            )
+            self._nodes.append(node)
             return
         if shutil.which('ros2') is None and command.startswith('ros2 '):
             command = f'{sys.executable} -m support.ros2_commands {command[5:]}'
+        self._check(['bash', '-c', command], command, fails=fails)
+
+    def _check(self, words: list[str], typed: str, *, fails: bool = False) -> None:
         done = subprocess.run(
-            ['bash', '-c', command],
+            words,
             cwd=self.folder,
-            env=environment,
+            env=_environment(),
             check=False,
             capture_output=True,
             text=True,
             timeout=_TIMEOUT,
         )
-        said = f'{command}\n{done.stdout}{done.stderr}'
+        said = f'{typed}\n{done.stdout}{done.stderr}'
         assert 'Traceback' not in said, said
         assert (done.returncode != 0) == fails, said
+
+
+def _environment() -> dict[str, str]:
+    paths = [str(Path(sys.executable).parent), os.environ['PATH']]
+    return {
+        **os.environ,
+        'PATH': os.pathsep.join(paths),
+        'MPLBACKEND': 'Agg',
+        'PYTHONPATH': str(ROOT / 'tests'),
+    }
