@@ -4,8 +4,14 @@
 const SIGNALS = ['tool_displacement', 'tool_velocity', 'workpiece_displacement', 'workpiece_velocity'];
 const MILLI = 1e3, MICRO = 1e6;
 
+// Colours, asked of the style sheet once: a plot asks for some thirty each time it is drawn.
+const colours = new Map();
+
 function css(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  if (!colours.has(name)) {
+    colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  }
+  return colours.get(name);
 }
 
 function axis(label, more) {
@@ -62,6 +68,7 @@ const resizing = new ResizeObserver(entries => {
 });
 document.querySelectorAll('.plot').forEach(place => resizing.observe(place));
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  colours.clear();
   for (const u of plots.values()) u.redraw();
 });
 
