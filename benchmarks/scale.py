@@ -41,7 +41,7 @@ from lathe_chatter.cli.worker_options import open_executor
 from lathe_chatter.dataset import Plan, generation, load_plan, make_dataset
 from lathe_chatter.executors import Processes, cores, run_batches
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.sweep import LatheSweep
+from lathe_chatter.lathe.many_lathes import LatheSweep
 from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.stability.batch_roots import operating_points
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from lathe_chatter.knocks import smallest_lasting_knock
     from lathe_chatter.lathe import Event, EventKind, VirtualLathe
     from lathe_chatter.lathe.config import LatheConfig
+    from lathe_chatter.lathe.many_lathes import LatheSweep
     from lathe_chatter.lathe.state import LatheState
-    from lathe_chatter.lathe.sweep import LatheSweep
     from lathe_chatter.model import BearingContact, Cut, Machine, Mode
     from lathe_chatter.model.machine_file import MachineDescription, load_machine
     from lathe_chatter.recording import Run, RunWriter, Samples, read_run
@@ -96,7 +96,7 @@ _MODULES = {
     'lathe': ('Event', 'EventKind', 'VirtualLathe'),
     'lathe.config': ('LatheConfig',),
     'lathe.state': ('LatheState',),
-    'lathe.sweep': ('LatheSweep',),
+    'lathe.many_lathes': ('LatheSweep',),
     'model': ('BearingContact', 'Cut', 'Machine', 'Mode'),
     'model.machine_file': ('MachineDescription', 'load_machine'),
     'recording': ('Run', 'RunWriter', 'Samples', 'read_run', 'recover', 'resimulate', 'verify'),

@@ -11,7 +11,7 @@ from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.errors import optional
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

@@ -19,7 +19,7 @@ from lathe_chatter.cli.worker_options import open_executor
 from lathe_chatter.errors import ParameterError, WorkerError
 from lathe_chatter.executors import Processes, run_batches, spread, width_of
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.sweep import LatheSweep
+from lathe_chatter.lathe.many_lathes import LatheSweep
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.stability import growth_map

@@ -19,7 +19,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.executors import spread
 from lathe_chatter.listening import Score, Signals, judge, read_signals
-from lathe_chatter.listening.judging import Label, read_labels, score_of
+from lathe_chatter.listening.detector_score import Label, read_labels, score_of
 
 _FORMS = ('.wav', '.csv', '.mat', '.parquet', '.mcap')
 _HOP, _RMS = 0.02, 0.05

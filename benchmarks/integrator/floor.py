@@ -17,7 +17,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import constants_of
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 
 _STEPS = 10_000
 _TURN = 200

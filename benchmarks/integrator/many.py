@@ -11,7 +11,7 @@ import numpy as np
 from figures import Figure, Line, tracked
 
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.sweep import LatheSweep
+from lathe_chatter.lathe.many_lathes import LatheSweep
 from lathe_chatter.model import Cut
 
 _LATHES = 48

@@ -11,7 +11,7 @@ from trials import FASTEST, SLOWEST, Trial, true_growth
 
 from lathe_chatter.detection.speed_advice import rule_of_thumb
 from lathe_chatter.supervisor import Seen
-from lathe_chatter.supervisor.moves import removal_rate
+from lathe_chatter.supervisor.move_search import removal_rate
 
 _CALM, _ALARM, _AFTER = 2.0, 6.0, 8.0
 """s of a stable cut before, in which an alarm must come, and that are given from the alarm on."""

@@ -26,7 +26,7 @@ from support.node_processes import NodeProcesses
 from trials import Trial, true_growth
 
 from lathe_chatter.lathe.config import LatheConfig
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.nodes.node_parameters import MONITOR
 from lathe_chatter.nodes.operator_node import parameter_arguments
 from lathe_chatter.supervisor import Limits

@@ -16,7 +16,7 @@ from lathe_chatter.stability import (
     seating_depth,
 )
 from lathe_chatter.supervisor import Limits
-from lathe_chatter.supervisor.moves import removal_rate
+from lathe_chatter.supervisor.move_search import removal_rate
 
 SLOWEST, FASTEST = 1000.0, 12000.0
 _SCAN = 60.0 / np.linspace(60.0 / SLOWEST, 60.0 / FASTEST, 400)

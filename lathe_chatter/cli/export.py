@@ -16,8 +16,8 @@ from lathe_chatter.recording.export import (
     to_mat,
     to_parquet,
 )
+from lathe_chatter.recording.one_message_per_sample import unroll
 from lathe_chatter.recording.sample_series import Selection
-from lathe_chatter.recording.unrolled_export import unroll
 
 EXAMPLE = 'lathe-chatter export runs/20260401-120000 --columns tool_displacement --start 3'
 

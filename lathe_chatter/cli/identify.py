@@ -16,7 +16,7 @@ from lathe_chatter.model import Machine, Mode
 from lathe_chatter.model.cut import BearingContact
 from lathe_chatter.model.machine import Structure
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.uncertainty import Uncertainty
 from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.tap_test import ModalFit, fit_modes, read_frequency_responses

@@ -16,7 +16,7 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
 from lathe_chatter.knocks.knock_map import Point
 from lathe_chatter.model import Cut
-from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.plot_style import files_of_picture, text_of
 from lathe_chatter.stability import contact_at
 

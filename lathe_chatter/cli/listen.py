@@ -14,9 +14,9 @@ from lathe_chatter.detection.filters import UNKNOWN_MACHINE
 from lathe_chatter.detection.sensors_to_displacement import sensors_among
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import Judged, Score, judge, read_signals, score
-from lathe_chatter.listening.judging import read_labels
+from lathe_chatter.listening.detector_score import read_labels
 from lathe_chatter.model.machine_file import load_machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.plot_style import files_of_picture
 
 EXAMPLE = 'lathe-chatter listen shop.wav --labels shop.csv --output heard.png'

@@ -24,7 +24,7 @@ from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact, Cut
-from lathe_chatter.model.quantities import Quantity, limits_of
+from lathe_chatter.model.quantity_fields import Quantity, limits_of
 from lathe_chatter.model.uncertainty import Uncertainty, uncertainty_from
 from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.report.probability_chart import (

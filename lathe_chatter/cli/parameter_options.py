@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from lathe_chatter.lathe.config import LatheConfig, config_from
-from lathe_chatter.model.lathe_parameters import LATHE
+from lathe_chatter.model.lathe_parameter_table import LATHE
 
 
 def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()) -> None:

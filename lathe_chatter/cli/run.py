@@ -12,9 +12,9 @@ from pathlib import Path
 from lathe_chatter.cli.common_options import add_json, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
-from lathe_chatter.cli.scenario_options import scenario_help, verdict
+from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
 from lathe_chatter.errors import RunFailedError, RunReadError
-from lathe_chatter.model.lathe_parameters import MACHINE_FILE
+from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.entry_points import no_ros

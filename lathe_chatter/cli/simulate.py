@@ -11,11 +11,11 @@ from lathe_chatter.cli.common_options import add_json, in_unit, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
-from lathe_chatter.cli.scenario_options import scenario_help, verdict
+from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
 from lathe_chatter.errors import ParameterError, ScenarioError
 from lathe_chatter.lathe.cut_event_sentences import Knock
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.values_with_units import number_in
 from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (

@@ -11,7 +11,7 @@ from contextlib import contextmanager, nullcontext
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.errors import ParameterError, optional
 from lathe_chatter.executors import RETRIES, Processes, cores
-from lathe_chatter.model.quantities import count_of
+from lathe_chatter.model.quantity_fields import count_of
 
 _DASK_TIMEOUT = 10.0
 

@@ -24,7 +24,7 @@ from lathe_chatter.dataset.windows import Table, windows_of
 from lathe_chatter.errors import DatasetError, reason_of
 from lathe_chatter.executors import run_batches
 from lathe_chatter.fingerprint import code_identity
-from lathe_chatter.model.lathe_parameters import LATHE
+from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.resumable_results import ResultFile
 from lathe_chatter.samples.columns import UNITS

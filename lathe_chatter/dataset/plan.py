@@ -17,10 +17,10 @@ from lathe_chatter.errors import MachineFileError, ParameterError, PlanError, re
 from lathe_chatter.lathe.config import config_from
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model.distribution import Distribution, distribution, distributions, values_of
-from lathe_chatter.model.lathe_parameters import CUT_ROWS, LATHE, MACHINE_FILE, MACHINE_ROWS
+from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE, MACHINE_FILE, MACHINE_ROWS
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
-from lathe_chatter.model.parameter_rows import Row
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.parameter_table import Row
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.model.yaml_section import Section, section_of, text_of
 from lathe_chatter.samples import sample_columns

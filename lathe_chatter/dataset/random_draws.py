@@ -11,8 +11,8 @@ from lathe_chatter.dataset.plan import OF_FILE, Plan
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
 from lathe_chatter.model.distribution import Distribution
-from lathe_chatter.model.lathe_parameters import MACHINE_FILE
-from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE
+from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.samples.columns import ACCELERATION_COLUMNS
 from lathe_chatter.stability import safe_limit

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.stability import recommend_speeds, rightmost_root, rightmost_roots
 
 _CANDIDATES = 8

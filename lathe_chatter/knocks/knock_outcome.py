@@ -11,8 +11,8 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_setup import LatheSetup
-from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.model.machine_and_sampling import LatheSetup
+from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.stability import contact_at
 
 _RATE = 1e4 / 775.0

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks.knock_outcome import follow_knock, linear_reach
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability import contact_at
 
 _STEP = Quantity('ratio of one knock tried to the one before', low=1.001, high=2.0)

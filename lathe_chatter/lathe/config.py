@@ -9,7 +9,7 @@ from typing import Any
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameters import (
+from lathe_chatter.model.lathe_parameter_table import (
     LATHE,
     MACHINE_FILE,
     cut_from,
@@ -17,7 +17,7 @@ from lathe_chatter.model.lathe_parameters import (
     parameters_of,
     setup_from,
 )
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.model.machine_file import MachineDescription
 
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut
-from lathe_chatter.model.quantities import quantity_of
+from lathe_chatter.model.quantity_fields import quantity_of
 
 BEGINNING = 'At 0.000000 s: the cut begins.'
 BEGINNING_AGAIN = 'At 0.000000 s: the cut begins again.'

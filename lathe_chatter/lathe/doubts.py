@@ -8,7 +8,7 @@ import numpy as np
 
 from lathe_chatter.lathe.integrator.coefficients import constants_of, steps_per_sample
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 
 _SHOWN = 3.0
 """Samples that a vibration has in a period, at least, where a spectrum shows it."""

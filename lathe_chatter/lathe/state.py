@@ -18,8 +18,8 @@ from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.lathe.integrator.coefficients import Constants, constants_of, steps_per_sample
 from lathe_chatter.lathe.integrator.eigenvectors import product
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
-from lathe_chatter.model.lathe_setup import LatheSetup
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.machine_and_sampling import LatheSetup
+from lathe_chatter.model.quantity_fields import Quantity
 
 _STATE = Quantity('initial state', 'm or m/s', low=-1e6, high=1e6)
 _FORMAT = 3

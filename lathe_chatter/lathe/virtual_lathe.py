@@ -15,8 +15,8 @@ from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import stepper, surface
 from lathe_chatter.lathe.state import LatheState, differences
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_setup import LatheSetup
-from lathe_chatter.model.quantities import Quantity, count_of
+from lathe_chatter.model.machine_and_sampling import LatheSetup
+from lathe_chatter.model.quantity_fields import Quantity, count_of
 from lathe_chatter.samples import sample_columns
 
 IMPULSE = Quantity('impulse of a knock on the tool', 'N s', low=-1e6, high=1e6)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lathe_chatter.listening.judging import CHATTER, Judged, Label
+from lathe_chatter.listening.detector_score import CHATTER, Judged, Label
 from lathe_chatter.listening.signal_file import Signals
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, grid, new_figure, save
 

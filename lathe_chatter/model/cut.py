@@ -10,7 +10,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model.quantities import check_choice, check_fields, quantity
+from lathe_chatter.model.quantity_fields import check_choice, check_fields, quantity
 
 
 class BearingContact(str, Enum):
@@ -124,7 +124,7 @@ class Cut:
 
     def _repr_html_(self) -> str:
         """As a notebook shows it."""
-        from lathe_chatter.model.parameter_rows import html_of
+        from lathe_chatter.model.parameter_table import html_of
 
         return html_of(self)
 

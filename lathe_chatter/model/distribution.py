@@ -11,8 +11,8 @@ import numpy as np
 import yaml
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model.parameter_rows import Row
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.parameter_table import Row
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.yaml_section import Section
 
 FIXED, UNIFORM, LOG_UNIFORM, NORMAL, CHOICE = 'fixed', 'uniform', 'log_uniform', 'normal', 'choice'

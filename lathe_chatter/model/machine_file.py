@@ -27,9 +27,9 @@ import yaml
 
 from lathe_chatter.errors import MachineFileError, ParameterError, reason_of
 from lathe_chatter.model.cut import BearingContact, Cut
-from lathe_chatter.model.lathe_setup import LatheSetup
 from lathe_chatter.model.machine import Body, Machine, Mode
-from lathe_chatter.model.quantities import Quantity, limits_of
+from lathe_chatter.model.machine_and_sampling import LatheSetup
+from lathe_chatter.model.quantity_fields import Quantity, limits_of
 from lathe_chatter.model.uncertainty import MODAL, MOST_VARIANCE, Uncertainty
 from lathe_chatter.model.values_with_units import number_in
 from lathe_chatter.model.yaml_section import Section, section_of, text_of

@@ -8,7 +8,7 @@ from dataclasses import replace
 import yaml
 
 from lathe_chatter.errors import MachineFileError, ParameterError, nearest_name
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.values_with_units import number_in, units_of
 
 _START = yaml.Mark('', 0, 0, 0, None, None)

@@ -6,8 +6,8 @@ import time
 
 from rclpy.node import Node
 
-from lathe_chatter.nodes.bounded_log import BoundedLog
 from lathe_chatter.nodes.diagnostics import OK, WARN, Status
+from lathe_chatter.nodes.log_rate_limit import BoundedLog
 from lathe_chatter.nodes.polled_subscription import publisher_names
 from lathe_chatter.nodes.real_time_loop import SECOND
 

@@ -15,16 +15,16 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameters import CUT_ROWS, LATHE, cut_from, samples_per_tick
-from lathe_chatter.model.parameter_rows import Value
+from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE, cut_from, samples_per_tick
+from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes import simulation_control, simulation_services
-from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
-from lathe_chatter.nodes.cut_event_log import LatheRecord
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
+from lathe_chatter.nodes.joint_states import nanoseconds
 from lathe_chatter.nodes.lathe_diagnostics import FLOOD, TickStatistics
 from lathe_chatter.nodes.lathe_graph_watch import ClockWatch, PublisherWatch
+from lathe_chatter.nodes.lathe_log_and_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
-from lathe_chatter.nodes.messages import nanoseconds
+from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.real_time_loop import (

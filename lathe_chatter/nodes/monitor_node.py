@@ -18,9 +18,9 @@ from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.lathe_parameters import machine_from
-from lathe_chatter.nodes.bounded_log import BoundedLog, QuickLog
+from lathe_chatter.model.lathe_parameter_table import machine_from
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.monitor_sentences import (
     SENTENCES,
     clearance,

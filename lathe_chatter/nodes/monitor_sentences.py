@@ -15,7 +15,7 @@ class Sentence(NamedTuple):
     Attributes:
         severity: `info`, `warning` or `error`.
         pattern: A regular expression that all of this kind match; a count may follow
-            (bounded_log.py).
+            (log_rate_limit.py).
         true_when: What must be so when it is said; `tests/nodes` brings each about.
     """
 

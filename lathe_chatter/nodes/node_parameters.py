@@ -1,7 +1,7 @@
 """The parameters of the nodes: one table each, from which everything about them is made.
 
-The lathe's stand in model/lathe_parameters.py, for they are also those of scenarios, options and
-records; the monitor has the machine's, and the recorder its own.
+The lathe's stand in model/lathe_parameter_table.py, for they are also those of scenarios, options
+and records; the monitor has the machine's, and the recorder its own.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from enum import Enum
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameters import (
+from lathe_chatter.model.lathe_parameter_table import (
     LATHE,
     MACHINE_FILE,
     MACHINE_ROWS,
     derived_machine,
     described_by,
 )
-from lathe_chatter.model.parameter_rows import ParameterTable, Resolved, Row, Values, rows_of
-from lathe_chatter.model.quantities import Quantity, limits_of
+from lathe_chatter.model.parameter_table import ParameterTable, Resolved, Row, Values, rows_of
+from lathe_chatter.model.quantity_fields import Quantity, limits_of
 from lathe_chatter.recording.open_chunk import Compression
 from lathe_chatter.supervisor import Limits, Mode
 

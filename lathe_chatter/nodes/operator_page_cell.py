@@ -16,15 +16,15 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.model.lathe_parameters import CUT_ROWS, LATHE
+from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE
 from lathe_chatter.nodes.diagnostics import DiagnosticsListener
 from lathe_chatter.nodes.operator_page_clients import CellClients
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.sample_receiver import join_blocks
 from lathe_chatter.page.live_signals import LiveSignals
 from lathe_chatter.page.server import Viewer
-from lathe_chatter.page.shared_state import Board
 from lathe_chatter.page.stability_chart import chart_key, stability_chart
+from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step, find_scenario, load_scenario
 from lathe_chatter.scenario.player import ScenarioPlayer

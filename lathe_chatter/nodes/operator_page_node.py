@@ -30,7 +30,7 @@ from lathe_chatter.nodes.operator_page_cell import OperatedCell
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.page.server import FRAME_PERIOD, PageServer, Viewer
-from lathe_chatter.page.shared_state import Board
+from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.scenario.scenario import shipped_scenarios
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
-from lathe_chatter.model.parameter_rows import Row
+from lathe_chatter.model.parameter_table import Row
 
 
 def descriptor_of(row: Row) -> ParameterDescriptor:

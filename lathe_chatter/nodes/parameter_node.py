@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import ParameterError, UnknownParameterError
-from lathe_chatter.model.parameter_rows import ParameterTable, Value
+from lathe_chatter.model.parameter_table import ParameterTable, Value
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 from lathe_chatter.nodes.real_time_loop import RequestLoad
 

@@ -34,9 +34,9 @@ from lathe_chatter.recording.provenance import (
     identity,
     parameter_values,
 )
-from lathe_chatter.recording.receive_stalls import ReceiveStalls
+from lathe_chatter.recording.recorder_stalls import ReceiveStalls
+from lathe_chatter.recording.recording_tally import RunLog
 from lathe_chatter.recording.ros_messages import LOG_TYPE
-from lathe_chatter.recording.run_events import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.snapshot import SnapshotBuffer
 

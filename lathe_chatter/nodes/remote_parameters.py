@@ -13,7 +13,7 @@ from rclpy.parameter import parameter_value_to_python
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.lathe_parameters import MACHINE_FILE, MACHINE_ROWS, machine_from
+from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE, MACHINE_ROWS, machine_from
 
 _SETTLING = 1.0
 """s from when this node has found the services of another to when the other has found it too: an

@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from lathe_chatter.errors import NodeFailedError, RunFailedError
-from lathe_chatter.model.lathe_parameters import LATHE
+from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.node_parameters import MONITOR, SUPERVISOR

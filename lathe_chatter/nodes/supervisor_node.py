@@ -20,8 +20,8 @@ from std_srvs.srv import SetBool, Trigger
 from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameters import cut_from, machine_from
-from lathe_chatter.model.parameter_rows import Value
+from lathe_chatter.model.lathe_parameter_table import cut_from, machine_from
+from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
@@ -30,7 +30,7 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
-from lathe_chatter.supervisor.moves import may_be
+from lathe_chatter.supervisor.move_search import may_be
 
 _LOOK_PERIOD = 0.02
 _SILENCE = 1.0

@@ -19,12 +19,12 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
-from lathe_chatter.page.shared_state import Board
 from lathe_chatter.page.stability_chart import draw_chart
+from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.chunk_messages import messages_of
-from lathe_chatter.recording.mcap_file import RecordedFile
-from lathe_chatter.recording.mcap_reader import Chunk, record_at
+from lathe_chatter.recording.mcap_chunk_walk import Chunk, record_at
+from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.report.operating_points import stays_of
 from lathe_chatter.report.run_history import History, read_history, value_near
 from lathe_chatter.samples.codec import SampleDecoder

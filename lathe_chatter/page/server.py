@@ -38,7 +38,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lathe_chatter.errors import LatheChatterError, StartError
-from lathe_chatter.page.shared_state import Board, encode_frame
+from lathe_chatter.page.versioned_values import Board, encode_frame
 
 FRAME_PERIOD = 0.05
 """s from one frame of a viewer to the next."""

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameters import cut_from, described_by, machine_from
+from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription
-from lathe_chatter.page.shared_state import finite
+from lathe_chatter.page.versioned_values import finite
 from lathe_chatter.report.stability_chart import (
     chart_limits,
     chart_speeds,

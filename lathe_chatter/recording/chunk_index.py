@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from mcap.opcode import Opcode
 
-from lathe_chatter.recording.mcap_reader import ChunkHead, Damage, Found, Plain
+from lathe_chatter.recording.mcap_chunk_walk import ChunkHead, Damage, Found, Plain
 
 _HEAD = 9
 """Bytes of a record before its content."""

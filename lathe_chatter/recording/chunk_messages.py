@@ -10,7 +10,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Integers
-from lathe_chatter.recording.mcap_reader import Chunk
+from lathe_chatter.recording.mcap_chunk_walk import Chunk
 
 HEAD = np.dtype(
     [

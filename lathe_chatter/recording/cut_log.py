@@ -21,7 +21,7 @@ from lathe_chatter.lathe.cut_event_sentences import (
     parse_knock,
 )
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameters import LATHE
+from lathe_chatter.model.lathe_parameter_table import LATHE
 
 Parameters = Mapping[str, Any]
 _NEEDED = {'spindle_speed_rpm', 'depth_of_cut', 'seed'}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from lathe_chatter.recording.mcap_file import Raw
+from lathe_chatter.recording.recorded_file import Raw
 from lathe_chatter.recording.ros_messages import types
 
 

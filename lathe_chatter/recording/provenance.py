@@ -58,9 +58,9 @@ _CORE = (
     'lathe/state.py',
     'lathe/virtual_lathe.py',
     'model/cut.py',
-    'model/lathe_setup.py',
+    'model/machine_and_sampling.py',
     'model/machine.py',
-    'model/quantities.py',
+    'model/quantity_fields.py',
 )
 """What the bits of a sample depend on; a test holds that the lathe imports nothing else."""
 

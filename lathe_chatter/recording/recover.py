@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lathe_chatter.recording.atomic_output import atomic_folder
-from lathe_chatter.recording.mcap_file import Note, RecordedFile, offered_qos
-from lathe_chatter.recording.mcap_reader import Damage
+from lathe_chatter.recording.file_completeness import lost_at_the_end
+from lathe_chatter.recording.mcap_chunk_walk import Damage
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.missing_files import lost_at_the_end
 from lathe_chatter.recording.open_chunk import OpenChunk, record_bytes
 from lathe_chatter.recording.provenance import RECOVERED
+from lathe_chatter.recording.recorded_file import Note, RecordedFile, offered_qos
 from lathe_chatter.recording.run import Run, read_run
-from lathe_chatter.recording.split_files import CLOSED, RunFiles, TopicRecords
+from lathe_chatter.recording.split_file_writer import CLOSED, RunFiles, TopicRecords
 
 _NOT_COPIED = (CLOSED, 'rosbag2')
 """Notes that a writer makes itself."""

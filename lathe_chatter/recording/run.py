@@ -16,8 +16,8 @@ from lathe_chatter.html_table import html_table
 from lathe_chatter.recording.bag_folder import RunFolder, refuse_other_format, run_folder
 from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.decoding import Recorded, decoded
-from lathe_chatter.recording.mcap_file import Contents, Note, Raw, RecordedFile
-from lathe_chatter.recording.mcap_reader import Damage
+from lathe_chatter.recording.mcap_chunk_walk import Damage
+from lathe_chatter.recording.recorded_file import Contents, Note, Raw, RecordedFile
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.recording.sample_order import sample_blocks
 from lathe_chatter.recording.sample_series import Samples, joined, selection

@@ -9,9 +9,9 @@ from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.lathe_parameters import cut_from, machine_from
+from lathe_chatter.model.lathe_parameter_table import cut_from, machine_from
 from lathe_chatter.recording.cut_log import CutSession
-from lathe_chatter.recording.run_events import RunLog, SamplesReceived
+from lathe_chatter.recording.recording_tally import RunLog, SamplesReceived
 
 SUMMARY = 'lathe_chatter/summary'
 """Name of the record; every value is JSON."""

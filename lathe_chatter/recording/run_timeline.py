@@ -17,7 +17,7 @@ import numpy as np
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
-from lathe_chatter.recording.mcap_file import Raw, RecordedFile
+from lathe_chatter.recording.recorded_file import Raw, RecordedFile
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 

@@ -14,7 +14,7 @@ from lathe_chatter.recording.disk_thread import DiskThread
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.open_chunk import Compression, OpenChunk
 from lathe_chatter.recording.received_counts import UnfinishedCounts
-from lathe_chatter.recording.split_files import CLOSED, RunFiles, TopicTable
+from lathe_chatter.recording.split_file_writer import CLOSED, RunFiles, TopicTable
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.recording.mcap_file import RecordedFile
+from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.recording.sample_reader import as_received, as_written
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.recording.chunk_messages import HEAD, Messages, messages_of
-from lathe_chatter.recording.mcap_file import RecordedFile
-from lathe_chatter.recording.mcap_reader import Chunk, Damage, read_chunk
+from lathe_chatter.recording.mcap_chunk_walk import Chunk, Damage, read_chunk
+from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.recording.sample_blocks import (
     AT_ONCE,
     BlockJoiner,

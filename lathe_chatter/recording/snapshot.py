@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.run_events import RunLog
+from lathe_chatter.recording.recording_tally import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.recording.run_writer import RunWriter
 

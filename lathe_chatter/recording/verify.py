@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, step_sentence
-from lathe_chatter.recording.mcap_file import Note, offered_qos
-from lathe_chatter.recording.metadata_check import check_metadata
-from lathe_chatter.recording.missing_files import (
+from lathe_chatter.recording.file_completeness import (
     check_end,
     check_files,
     check_order,
     noted,
 )
+from lathe_chatter.recording.metadata_check import check_metadata
 from lathe_chatter.recording.provenance import (
     PUBLISHERS,
     RECEPTION,
     STALLS,
     noted_pauses,
 )
+from lathe_chatter.recording.recorded_file import Note, offered_qos
 from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification_result import Finding, SampleCount, Verification

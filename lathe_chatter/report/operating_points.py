@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.machine_file import MachineDescription
-from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.plot_style import ALARM
 from lathe_chatter.report.probability_chart import draw_probability
 from lathe_chatter.report.run_history import History

@@ -19,7 +19,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.cut_event_sentences import BEGINNING, BEGINNING_AGAIN, Change, Knock
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameters import cut_from, described_by, machine_from
+from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence

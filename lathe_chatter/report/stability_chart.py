@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.quantities import limits_of
+from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.plot_style import (
     LINE,
     OPEN,

@@ -19,9 +19,9 @@ from lathe_chatter.errors import (
     nearest_name,
     reason_of,
 )
-from lathe_chatter.model.lathe_parameters import LATHE, MACHINE_FILE
+from lathe_chatter.model.lathe_parameter_table import LATHE, MACHINE_FILE
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 
 RECOMMENDED = 'recommended'
 """Stands for the speed that the monitor recommends."""

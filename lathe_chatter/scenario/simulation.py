@@ -20,7 +20,7 @@ from lathe_chatter.lathe.cut_event_sentences import (
     change_sentence,
     knock_sentence,
 )
-from lathe_chatter.model.lathe_parameters import LATHE, described_by
+from lathe_chatter.model.lathe_parameter_table import LATHE, described_by
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.scenario.player import ScenarioPlayer
 from lathe_chatter.scenario.scenario import CLEARED, FLAGGED, Scenario, Step

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Body, Cut, Machine
-from lathe_chatter.model.quantities import Quantity, quantity_of
+from lathe_chatter.model.quantity_fields import Quantity, quantity_of
 from lathe_chatter.stability.compiled_characteristic import (
     ALPHA,
     BETA,

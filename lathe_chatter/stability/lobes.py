@@ -18,7 +18,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.model import Machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.characteristic import (
     LEAST_DAMPING,
     NO_DAMPING,

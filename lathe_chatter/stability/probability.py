@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.quantities import Quantity, count_of
+from lathe_chatter.model.quantity_fields import Quantity, count_of
 from lathe_chatter.model.uncertainty import Uncertainty
 from lathe_chatter.resumable_results import spread_into
 from lathe_chatter.stability.characteristic import checked

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.characteristic import (
     NO_DAMPING,
     Complex,

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.characteristic import (
     Machines,
     ProcessDamping,

@@ -15,7 +15,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.quantities import Quantity
+from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.axis_crossings import axis_crossings
 from lathe_chatter.stability.characteristic import (
     LEAST_DAMPING,

@@ -11,7 +11,7 @@ from itertools import chain
 from statistics import median
 
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.supervisor.moves import (
+from lathe_chatter.supervisor.move_search import (
     Limits,
     as_heard,
     chance_of,

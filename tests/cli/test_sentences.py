@@ -19,7 +19,7 @@ from support.recorded import number, topic
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.config import config_from
-from lathe_chatter.model.lathe_parameters import parameters_of
+from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter
 
 CLI = Path(__file__).resolve().parents[2] / 'lathe_chatter' / 'cli'

@@ -7,7 +7,7 @@ import pytest
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import BearingContact
-from lathe_chatter.model.lathe_parameters import LATHE
+from lathe_chatter.model.lathe_parameter_table import LATHE
 
 
 def test_parameters_come_back_as_they_were() -> None:

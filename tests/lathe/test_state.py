@@ -11,7 +11,7 @@ from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 
 _MACHINE = Machine(Mode(0.04, 800.0, 0.03), Mode(0.06, 600.0, 0.04), cutting_coefficient=3e6)
 

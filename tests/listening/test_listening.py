@@ -15,7 +15,7 @@ from lathe_chatter.detection import Estimate
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.listening import Judged, read_signals, score
-from lathe_chatter.listening.judging import Label, read_labels
+from lathe_chatter.listening.detector_score import Label, read_labels
 from lathe_chatter.model import Cut
 
 

@@ -10,7 +10,7 @@ import pytest
 from lathe_chatter.errors import MachineFileError, ParameterError
 from lathe_chatter.lathe.config import config_from
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.lathe_parameters import LATHE, machine_from
+from lathe_chatter.model.lathe_parameter_table import LATHE, machine_from
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.model.uncertainty import uncertainty_from
 

@@ -27,9 +27,9 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.cut_event_sentences import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.nodes.joint_states import joint_states
 from lathe_chatter.nodes.lathe_diagnostics import FLOOD
 from lathe_chatter.nodes.lathe_node import LatheNode
-from lathe_chatter.nodes.messages import joint_states
 from lathe_chatter.nodes.simulation_control import RunState
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

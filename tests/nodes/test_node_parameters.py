@@ -12,8 +12,13 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
-from lathe_chatter.model.lathe_parameters import LATHE, cut_from, machine_from, samples_per_tick
-from lathe_chatter.model.parameter_rows import Row
+from lathe_chatter.model.lathe_parameter_table import (
+    LATHE,
+    cut_from,
+    machine_from,
+    samples_per_tick,
+)
+from lathe_chatter.model.parameter_table import Row
 from lathe_chatter.nodes.node_parameters import MONITOR
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 

@@ -215,11 +215,11 @@ SAID = {
             f'{MONITOR}::test_the_machine_is_asked_from_the_lathe',
         ),
     },
-    'bounded_log.py': {
+    'log_rate_limit.py': {
         ' ({} of this kind in {} s.)': (
             'so many sentences of the kind came in that time and were held back',
             (
-                'nodes/test_bounded_log.py::'
+                'nodes/test_log_rate_limit.py::'
                 'test_a_flood_is_a_burst_and_then_one_line_a_period_that_counts_the_rest'
             ),
         ),

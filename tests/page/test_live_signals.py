@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.page.live_signals import COUNT, SIGNALS, Envelope, LiveSignals
-from lathe_chatter.page.shared_state import Board, encode_frame
+from lathe_chatter.page.versioned_values import Board, encode_frame
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 RATE = 1e4

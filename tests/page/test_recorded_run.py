@@ -20,7 +20,7 @@ from support.browser import Browser, chromium
 from lathe_chatter.cli.main import main
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.model.lathe_parameters import parameters_of
+from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.page.live_signals import SIGNALS
 from lathe_chatter.page.recorded_run import RecordedRun
 from lathe_chatter.page.server import Viewer

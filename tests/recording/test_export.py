@@ -16,7 +16,7 @@ from support.recorded import BOOL, NUMBER, STORE
 from lathe_chatter.array_types import Array
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model.lathe_parameters import parameters_of
+from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, read_run, verify
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.columns import UNITS

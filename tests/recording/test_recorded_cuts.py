@@ -10,7 +10,7 @@ import pytest
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.cut_event_sentences import BEGINNING, BEGINNING_AGAIN, change_sentence
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameters import parameters_of
+from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter, read_run, resimulate, verify
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
 from lathe_chatter.recording.provenance import (

@@ -20,7 +20,7 @@ from lathe_chatter.lathe.cut_event_sentences import (
     knock_sentence,
 )
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.model.lathe_parameters import parameters_of
+from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate
 from lathe_chatter.recording.provenance import IDENTITY, PARAMETERS, identity, parameter_values
 from lathe_chatter.recording.ros_messages import parameters_bytes

@@ -11,7 +11,7 @@ from support.recorded import number, topic
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import RunReadError
 from lathe_chatter.recording import RunWriter, read_run
-from lathe_chatter.recording.mcap_file import RecordedFile
+from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 

@@ -11,7 +11,7 @@ from support.recorded import ARRAY, topic
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model.lathe_parameters import parameters_of
+from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, Run, RunWriter, read_run
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block

@@ -23,7 +23,7 @@ from lathe_chatter.lathe.integrator.eigenvectors import Basis, basis_of, inverse
 from lathe_chatter.lathe.integrator.propagation import RATE_STEP, TERMS
 from lathe_chatter.lathe.integrator.surface import aligned
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 
 _TURN_PER_STEP = 0.05
 _TURN_PER_STEP_UNBALANCED = 0.02

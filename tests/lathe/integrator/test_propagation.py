@@ -20,7 +20,7 @@ from lathe_chatter.lathe.integrator.coefficients import (
 )
 from lathe_chatter.lathe.integrator.propagation import TERMS
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.model.lathe_setup import LatheSetup
+from lathe_chatter.model.machine_and_sampling import LatheSetup
 
 _SEVERAL = Machine(
     [Mode(0.4, 2000.0, 0.03, chip=0.8, force=-0.3), Mode(1.2, 1100.0, 0.02)],

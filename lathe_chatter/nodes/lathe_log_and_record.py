@@ -20,8 +20,8 @@ from lathe_chatter.lathe.cut_event_sentences import (
 )
 from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model import Cut
-from lathe_chatter.nodes.bounded_log import QuickLog
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
+from lathe_chatter.nodes.log_rate_limit import QuickLog
 from lathe_chatter.recording import LatheRun
 
 _COMMIT_PERIOD = 0.25

@@ -15,7 +15,7 @@ from typing import Any, TypeGuard
 
 from lathe_chatter.errors import ParameterError, nearest_name
 from lathe_chatter.html_table import html_table
-from lathe_chatter.model.quantities import Quantity, check_choice, quantity_of
+from lathe_chatter.model.quantity_fields import Quantity, check_choice, quantity_of
 from lathe_chatter.model.values_with_units import number_in
 
 Value = bool | int | float | str | list[str]

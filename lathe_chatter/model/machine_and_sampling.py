@@ -8,7 +8,7 @@ import numpy as np
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model.machine import Machine
-from lathe_chatter.model.quantities import Quantity, check_fields, quantity
+from lathe_chatter.model.quantity_fields import Quantity, check_fields, quantity
 
 SEED = Quantity('seed of every random number', low=0.0, high=2.0**31 - 1.0)
 

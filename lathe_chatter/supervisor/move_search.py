@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.quantities import check_fields, limits_of, quantity
+from lathe_chatter.model.quantity_fields import check_fields, limits_of, quantity
 from lathe_chatter.model.uncertainty import equally_uncertain
 from lathe_chatter.stability import (
     ProcessDamping,

@@ -14,7 +14,7 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import spread
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut
-from lathe_chatter.model.quantities import count_of
+from lathe_chatter.model.quantity_fields import count_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 _BLOCK = 4096

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model.quantities import (
+from lathe_chatter.model.quantity_fields import (
     Quantity,
     check_choice,
     check_fields,

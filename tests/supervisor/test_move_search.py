@@ -12,7 +12,14 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.stability import critical_depth, floquet, leading_roots
 from lathe_chatter.supervisor import Limits
-from lathe_chatter.supervisor.moves import Move, as_heard, fits, may_be, moves_for, removal_rate
+from lathe_chatter.supervisor.move_search import (
+    Move,
+    as_heard,
+    fits,
+    may_be,
+    moves_for,
+    removal_rate,
+)
 
 MACHINE = Machine()
 DEEP = Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.NONE)

@@ -15,7 +15,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import Processes
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.sweep import LatheSweep, sample_rate_for
+from lathe_chatter.lathe.many_lathes import LatheSweep, sample_rate_for
 from lathe_chatter.model import Cut
 from lathe_chatter.samples import SAMPLE_COLUMNS
 

@@ -23,7 +23,7 @@ from mcap.records import Attachment, Metadata
 
 from lathe_chatter.recording.chunk_index import Span, spans_of
 from lathe_chatter.recording.chunk_messages import Messages, messages_of
-from lathe_chatter.recording.mcap_reader import (
+from lathe_chatter.recording.mcap_chunk_walk import (
     Chunk,
     ChunkHead,
     Damage,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from lathe_chatter.nodes.bounded_log import BURST, MAX_KINDS, PERIOD, BoundedLog, QuickLog
+from lathe_chatter.nodes.log_rate_limit import BURST, MAX_KINDS, PERIOD, BoundedLog, QuickLog
 
 
 class Lines(QuickLog):

@@ -16,11 +16,11 @@ from typing import Any, Protocol, TypeVar
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model.cut import Cut
-from lathe_chatter.model.lathe_setup import SEED, LatheSetup
 from lathe_chatter.model.machine import Body, Machine, Structure
+from lathe_chatter.model.machine_and_sampling import SEED, LatheSetup
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
-from lathe_chatter.model.parameter_rows import ParameterTable, Resolved, Row, Values, rows_of
-from lathe_chatter.model.quantities import Quantity, limits_of
+from lathe_chatter.model.parameter_table import ParameterTable, Resolved, Row, Values, rows_of
+from lathe_chatter.model.quantity_fields import Quantity, limits_of
 
 T = TypeVar('T')
 
