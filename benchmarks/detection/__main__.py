@@ -18,7 +18,6 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
 import json
-import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -31,6 +30,7 @@ from onsets import onsets
 from recordings import recordings
 from scenarios import NOISES
 
+from lathe_chatter.cli.bench import this_machine
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.cli.worker_options import add_executor, executor_of
 
@@ -87,11 +87,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             found[part] = every[part](options)
             if not options.json:
                 print('\n'.join(found[part]), flush=True)
-    machine = f'{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}'
+
     if options.json:
         print(json.dumps(found, indent=2))
     else:
-        print(f'{machine}; {time.monotonic() - begin:.0f} s')
+        print(f'{this_machine()}; {time.monotonic() - begin:.0f} s')
     return 0
 
 

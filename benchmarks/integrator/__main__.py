@@ -28,6 +28,8 @@ from peers import peers
 from speed import speed
 from startup import startup
 
+from lathe_chatter.cli.bench import this_machine
+
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure what was asked for."""
@@ -52,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     unknown = set(options.parts) - set(parts)
     if unknown:
         parser.error(f'no such part: {", ".join(sorted(unknown))}; there are {", ".join(parts)}')
-    machine = figures.machine()
+    machine = this_machine()
     if not options.json:
         print(machine)
     found = {}

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
@@ -104,20 +101,3 @@ def tracked(items: Sequence[Item], description: str) -> Iterable[Item]:
     """The items, and on standard error how many are done."""
     with progress() as display:
         yield from display.track(items, description=description)
-
-
-def machine() -> str:
-    """What these figures were measured on."""
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path('/proc/cpuinfo')
-    if cpuinfo.exists():
-        named = [
-            line for line in cpuinfo.read_text().splitlines() if line.startswith('model name')
-        ]
-        model = named[0].partition(':')[2].strip() if named else model
-    load = f', load average {os.getloadavg()[0]:.1f}' if hasattr(os, 'getloadavg') else ''
-    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'scipy', 'numba'))
-    return (
-        f'{os.cpu_count()} cores, {model}, {platform.system()} {platform.release()}{load}; '
-        f'Python {platform.python_version()}, {versions}'
-    )

@@ -29,9 +29,9 @@ import rclpy
 from answers import measure_requests
 from chaos import measure_chaos
 from factor import measure_factor
-from processes import machine
 from repeats import repeats
 
+from lathe_chatter.cli.bench import this_machine
 from lathe_chatter.precompile import precompile
 
 FIGURES: dict[str, Callable[[Any], None]] = {
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with domain_coordinator.domain_id() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         rclpy.init()
-        print(machine())
+        print(f'{this_machine()}, {rclpy.get_rmw_implementation_identifier()}')
         for name in options.figures or FIGURES:
             known[name](options)
         rclpy.shutdown()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
-import platform
 import signal
 import subprocess
 import sys
@@ -13,8 +12,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-
-import rclpy
 
 from lathe_chatter.nodes.node_main import make_executor
 
@@ -98,15 +95,3 @@ def executor_of(node: Any) -> Any:
     executor = make_executor(node)
     executor.add_node(node)
     return executor
-
-
-def machine() -> str:
-    """What this was measured on."""
-    model = platform.machine()
-    with contextlib.suppress(OSError, StopIteration):
-        lines = Path('/proc/cpuinfo').read_text().splitlines()
-        model = next(line for line in lines if line.startswith('model name')).partition(': ')[2]
-    return (
-        f'{model}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, '
-        f'Python {platform.python_version()}, rclpy {rclpy.get_rmw_implementation_identifier()}'
-    )

@@ -27,7 +27,8 @@ import live
 import pictures
 import rclpy
 import recorded
-from processes import machine
+
+from lathe_chatter.cli.bench import this_machine
 
 PARTS: dict[str, Callable[[Any], Iterator[str]]] = {
     'feed': lambda options: live.feed(options.seconds),
@@ -61,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with domain_coordinator.domain_id() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         rclpy.init()
-        print(machine())
+        print(f'{this_machine()}, {rclpy.get_rmw_implementation_identifier()}')
         for part in options.parts or PARTS:
             for line in known[part](options):
                 print(line, flush=True)

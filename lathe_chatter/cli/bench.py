@@ -73,7 +73,7 @@ def median_time(work: Callable[[], Any], repeats: int) -> float:
 
 
 def this_machine() -> str:
-    """The machine in one line: processor, cores, system and Python."""
+    """The machine in one line: processor, cores, system, Python and how busy it is."""
     processor = platform.processor() or platform.machine()
     info = Path('/proc/cpuinfo')
     if info.is_file():
@@ -83,7 +83,7 @@ def this_machine() -> str:
                 break
     return (
         f'{processor}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, '
-        f'Python {platform.python_version()}'
+        f'Python {platform.python_version()}, load average {os.getloadavg()[0]:.1f}'
     )
 
 
