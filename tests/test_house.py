@@ -24,7 +24,7 @@ LONGEST = 400
 
 BASE = {
     *('array_types', 'fingerprint', 'compiled', 'errors', 'executors', 'html_table', 'plot_style'),
-    'resumable_results',
+    *('resumable_results', 'shipped_files'),
 }
 """What everybody may use: they use nothing but each other."""
 ARROWS = {

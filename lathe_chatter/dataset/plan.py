@@ -185,7 +185,7 @@ def _event(entry: Section) -> Event:
 
 
 def _splits(section: Section) -> dict[str, float]:
-    shares = {name: section.number(name, _SHARE) or 0.0 for name in section.nodes}
+    shares = section.values(dict.fromkeys(section.nodes, Row('', 0.0, '', _SHARE)))
     if shares and abs(sum(shares.values()) - 1.0) > 1e-9:
         raise section.refused('the shares must add up to 1')
     if wrong := [name for name in shares if not name.isidentifier()]:

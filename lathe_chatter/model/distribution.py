@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import yaml
 
-from lathe_chatter.errors import ParameterError
 from lathe_chatter.model.parameter_table import Row
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.yaml_section import Section
@@ -80,14 +79,7 @@ def values_of(section: Section, rows: Iterable[Row], *others: str) -> dict[str, 
         MachineFileError: With file, line, field, value and what is allowed.
     """
     named = {row.name: row for row in rows}
-    section.only(*named, *others)
-    found = {name: row.default for name, row in named.items()}
-    for name in named.keys() & section.nodes.keys():
-        how = distribution(section, name, named[name])
-        if how.kind != FIXED:
-            raise section.refused(f'{name} must be a single value', section.nodes[name])
-        found[name] = how.values[0]
-    return found
+    return {n: row.default for n, row in named.items()} | section.values(named, *others)
 
 
 def distribution(section: Section, name: str, row: Row, *, of_limit: bool = False) -> Distribution:
@@ -98,9 +90,8 @@ def distribution(section: Section, name: str, row: Row, *, of_limit: bool = Fals
     """
     node = section.nodes[name]
     if not isinstance(node, yaml.MappingNode):
-        return Distribution(FIXED, (_value(section, node, row),), of_limit=of_limit)
-    inner = section.section(name)
-    assert inner is not None  # noqa: S101 -- it is a mapping
+        return Distribution(FIXED, (section.value(name, node, row),), of_limit=of_limit)
+    inner = section.inner(name)
     limited = name == 'depth_of_cut' and not of_limit
     inner.only(*_PAIRS, CHOICE, *([OF_LIMIT] if limited else []))
     if len(inner.nodes) != 1:
@@ -108,7 +99,9 @@ def distribution(section: Section, name: str, row: Row, *, of_limit: bool = Fals
     ((kind, given),) = inner.nodes.items()
     if kind == OF_LIMIT:
         return distribution(inner, OF_LIMIT, FACTOR, of_limit=True)
-    values = tuple(_value(inner, entry, row) for entry in _entries(inner, kind, given))
+    if not isinstance(given, yaml.SequenceNode) or not given.value:
+        raise inner.refused(f'{kind} must be a list of values', given)
+    values = tuple(inner.value(kind, entry, row) for entry in given.value)
     limits = row.limits
     if kind in _PAIRS:
         wrong = len(values) != 2 or limits is None or values[-1] <= 0.0
@@ -119,22 +112,3 @@ def distribution(section: Section, name: str, row: Row, *, of_limit: bool = Fals
             raise inner.refused('log_uniform must begin above 0', given)
     low, high = (limits.low, limits.high) if limits else (-math.inf, math.inf)
     return Distribution(kind, values, low, high, of_limit)
-
-
-def _entries(section: Section, kind: str, node: yaml.Node) -> Iterator[yaml.Node]:
-    if not isinstance(node, yaml.SequenceNode) or not node.value:
-        raise section.refused(f'{kind} must be a list of values', node)
-    yield from node.value
-
-
-def _value(section: Section, node: yaml.Node, row: Row) -> Any:
-    """A scalar as the parameter holds it."""
-    if not isinstance(node, yaml.ScalarNode):
-        raise section.refused(f'{row.name} must be a value, or how it is drawn', node)
-    value = row.parsed(node.value)
-    if isinstance(row.default, bool):
-        value = {'true': True, 'false': False}.get(node.value, value)
-    try:
-        return row.check(value)
-    except ParameterError as error:
-        raise section.refused(str(error).rstrip('.'), node) from None

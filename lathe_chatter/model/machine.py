@@ -61,7 +61,7 @@ class Mode:
         """Validate."""
         check_fields(self)
         for name in ('chip', 'force', 'bearing'):
-            object.__setattr__(self, name, _PARTICIPATION.check(name, getattr(self, name)))
+            object.__setattr__(self, name, PARTICIPATION.check(name, getattr(self, name)))
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -239,7 +239,7 @@ class Machine:
         return html_of(self)
 
 
-_PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
+PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
 
 
 def _body(name: str, given: object) -> Body:

@@ -1,24 +1,16 @@
 """A machine as a file: what a tap test and the machine's plate say, with units.
 
-    tool:
-      modes:
-        - {frequency: 312 Hz, damping_ratio: 0.03, stiffness: 21 N/um}
-    workpiece:
-      modes:
-        - {frequency: 120 Hz, damping_ratio: 3 %, mass: 20 kg, errors: {frequency: 0.2 %}}
-    bearing: {stiffness: 5e7 N/m, clearance: 5 um, contact: gap}
-    material: {cutting_coefficient: 1500 MPa, errors: {cutting_coefficient: 15 %}}
-    spindle: {slowest_speed: 60 rpm, fastest_speed: 3000 rpm, acceleration: 500 rpm/s}
-    cut: {spindle_speed: 900 rpm, depth_of_cut: 0.5 mm, feed: 0.2 mm/rev}
-
-A bare number is SI. What is left out is the paper's, of which a bearing is the exception: a
-machine without one has no bearing clearance. docs/reference/machine_file.md has every field.
+docs/reference/machine_file.md has an example and every field. A bare number is SI. What is left
+out is the paper's, of which a bearing is the exception: a machine without one has no bearing
+clearance.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -27,36 +19,42 @@ import yaml
 
 from lathe_chatter.errors import MachineFileError, ParameterError, reason_of
 from lathe_chatter.model.cut import BearingContact, Cut
-from lathe_chatter.model.machine import Body, Machine, Mode
+from lathe_chatter.model.machine import PARTICIPATION, Body, Machine, Mode
 from lathe_chatter.model.machine_and_sampling import LatheSetup
+from lathe_chatter.model.parameter_table import Row, rows_of
 from lathe_chatter.model.quantity_fields import Quantity, limits_of
 from lathe_chatter.model.uncertainty import MODAL, MOST_VARIANCE, Uncertainty
 from lathe_chatter.model.values_with_units import number_in
-from lathe_chatter.model.yaml_section import Section, section_of, text_of
+from lathe_chatter.model.yaml_section import Section, section_of
+from lathe_chatter.shipped_files import shipped_files
 
 _TURN = 2.0 * np.pi
-_PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
-_MODE = {
-    'frequency': Quantity('undamped natural frequency', 'Hz', high=1e6 / _TURN, exclusive=True),
-    'damping_ratio': limits_of(Mode, 'damping_ratio'),
-    'mass': limits_of(Mode, 'mass'),
-    'stiffness': Quantity('modal stiffness', 'N/m', high=1e18, exclusive=True),
-    **dict.fromkeys(('chip', 'force', 'bearing'), _PARTICIPATION),
-}
-_UNCERTAIN = {k: _MODE[k] for k in ('frequency', 'damping_ratio', 'mass', 'stiffness')}
-_COEFFICIENT = {'cutting_coefficient': limits_of(Machine, 'cutting_coefficient')}
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
-_SPINDLE = dict.fromkeys(('slowest_speed', 'fastest_speed'), _SPEED)
-_SPINDLE['acceleration'] = limits_of(LatheSetup, 'spindle_acceleration')
-_OF_CUT = {
-    'bearing': {'clearance': 'bearing_clearance'},
-    'material': {'process_damping': 'process_damping'},
-    'cut': {'spindle_speed': 'spindle_speed_rpm', 'feed': 'feed_per_revolution'}
-    | {name: name for name in ('depth_of_cut', 'feed_speed', 'workpiece_diameter')},
+_MOST_ERROR = 10.0
+"""Relative standard error that is allowed."""
+_IN_FILE = {
+    'bearing': {
+        'stiffness': 'machine.bearing_stiffness',
+        'clearance': 'cut.bearing_clearance',
+        'contact': 'cut.bearing_contact',
+    },
+    'material': {
+        'cutting_coefficient': 'machine.cutting_coefficient',
+        'process_damping': 'cut.process_damping',
+    },
+    'spindle': {
+        'slowest_speed': 'slowest_speed',
+        'fastest_speed': 'fastest_speed',
+        'acceleration': 'spindle_acceleration',
+    },
+    'cut': {
+        'spindle_speed': 'cut.spindle_speed_rpm',
+        'feed': 'cut.feed_per_revolution',
+        **{n: f'cut.{n}' for n in ('depth_of_cut', 'feed_speed', 'workpiece_diameter')},
+    },
 }
-"""Names in the file of what are fields of a `Cut`, by section."""
-_USUAL_SPEED = Cut().spindle_speed_rpm
-_SECTIONS = ('tool', 'workpiece', 'bearing', 'material', 'spindle', 'cut')
+"""Where each value of the file but those of the modes stands in a `MachineDescription`."""
+_BESIDE = {'material': ['errors']}
 
 
 @dataclass(frozen=True)
@@ -71,6 +69,9 @@ class MachineDescription:
         spindle_acceleration: rev/min per s, 0 where a change of speed is a step.
         uncertainty: How well the figures are known, None where the file says nothing of it.
         name: Of the file, for titles.
+
+    Raises:
+        ParameterError: If the slowest speed is not below the fastest.
     """
 
     machine: Machine = field(default_factory=Machine)
@@ -80,6 +81,12 @@ class MachineDescription:
     spindle_acceleration: float = 0.0
     uncertainty: Uncertainty | None = None
     name: str = ''
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if not self.slowest_speed < self.fastest_speed:
+            allowed = f'above slowest_speed, {self.slowest_speed:g} rev/min'
+            raise ParameterError('fastest_speed', self.fastest_speed, 'rev/min', allowed)
 
     @property
     def speed_range(self) -> tuple[float, float] | None:
@@ -104,57 +111,45 @@ class MachineDescription:
             raise MachineFileError(f'{path} cannot be written: {reason_of(error)}.') from None
 
     def _sections(self) -> dict[str, Any]:
-        known = self.uncertainty
-        made: dict[str, Any] = {}
+        known, made = self.uncertainty or Uncertainty(), dict[str, Any]()
         for name in ('tool', 'workpiece'):
             body: Body = getattr(self.machine, name)
             made[name] = {'modes': [_described(mode) for mode in body.modes]}
-            covariance = known.covariance_of(name, len(body.modes)) if known else None
-            if covariance is not None:
+            if (covariance := known.covariance_of(name, len(body.modes))) is not None:
                 made[name]['covariance'] = covariance.tolist()
-        made['bearing'] = {
-            'stiffness': self.machine.bearing_stiffness,
-            **self._of_cut('bearing'),
-            'contact': self.cut.bearing_contact.value,
-        }
-        made['material'] = {
-            'cutting_coefficient': self.machine.cutting_coefficient,
-            **self._of_cut('material'),
-        }
-        if known and (error := known.error_of('cutting_coefficient')):
+        for name, places in _IN_FILE.items():
+            made[name] = {key: attrgetter(place)(self) for key, place in places.items()}
+        made['bearing']['contact'] = self.cut.bearing_contact.value
+        if error := known.error_of('cutting_coefficient'):
             made['material']['errors'] = {'cutting_coefficient': f'{100.0 * error!r} %'}
-        if self.speed_range is not None:
-            slowest, fastest = self.speed_range
-            made['spindle'] = {'slowest_speed': slowest, 'fastest_speed': fastest}
-        if self.spindle_acceleration:
-            made.setdefault('spindle', {})['acceleration'] = self.spindle_acceleration
-        made['cut'] = self._of_cut('cut')
         return made
 
-    def _of_cut(self, section: str) -> dict[str, float]:
-        return {name: getattr(self.cut, field) for name, field in _OF_CUT[section].items()}
+
+_ROWS = {row.name: row for row in (*rows_of(LatheSetup()), *rows_of(MachineDescription()))}
+_ROWS['slowest_speed'] = _ROWS['fastest_speed'] = _ROWS['cut.spindle_speed_rpm']
+_COEFFICIENT = {'cutting_coefficient': _ROWS['machine.cutting_coefficient']}
+_FREQUENCY = Quantity('undamped natural frequency', 'Hz', high=1e6 / _TURN, exclusive=True)
+_STIFFNESS = Quantity('modal stiffness', 'N/m', high=1e18, exclusive=True)
+_UNCERTAIN = {
+    'frequency': Row('', 0.0, '', _FREQUENCY),
+    'damping_ratio': _ROWS['machine.tool.damping_ratio'],
+    'mass': _ROWS['machine.tool.mass'],
+    'stiffness': Row('', 0.0, '', _STIFFNESS),
+}
+_PARTS = dict.fromkeys(('chip', 'force', 'bearing'), Row('', 1.0, '', PARTICIPATION))
 
 
 def _described(mode: Mode) -> dict[str, Any]:
     """A mode as the file has it; mass and angular frequency come back to the last bit."""
-    described: dict[str, Any] = {
-        'frequency': f'{mode.natural_frequency!r} rad/s',
-        'damping_ratio': mode.damping_ratio,
-        'mass': mode.mass,
-    }
-    parts = {name: getattr(mode, name) for name in ('chip', 'force', 'bearing')}
-    return described | {name: value for name, value in parts.items() if value != 1.0}
+    frequency = f'{mode.natural_frequency!r} rad/s'
+    parts = {name: getattr(mode, name) for name in _PARTS}
+    found = {'frequency': frequency, 'damping_ratio': mode.damping_ratio, 'mass': mode.mass}
+    return found | {name: value for name, value in parts.items() if value != 1.0}
 
 
 def shipped_machines() -> dict[str, Path]:
     """The machine files of the package by name."""
-    package = Path(__file__).resolve().parents[1]
-    places = [
-        package.parent / 'config' / 'machines',
-        *(p / 'share' / 'lathe_chatter' / 'config' / 'machines' for p in package.parents),
-    ]
-    place = next((place for place in places if place.is_dir()), places[0])
-    return {file.stem: file for file in sorted(place.glob('*.yaml'))}
+    return shipped_files('machines')
 
 
 def load_machine(source: Path | str) -> MachineDescription:
@@ -183,67 +178,48 @@ def load_machine(source: Path | str) -> MachineDescription:
 
 
 def _description(top: Section, name: str) -> MachineDescription:
-    top.only(*_SECTIONS)
-    machine: dict[str, Any] = {}
-    known = Uncertainty()
+    top.only('tool', 'workpiece', *_IN_FILE)
+    known, given = Uncertainty(), dict[str, Any]()
     for part in ('tool', 'workpiece'):
-        if section := top.section(part):
-            machine[part], known = _body(section, part, known)
-    bearing, material = top.inner('bearing'), top.inner('material')
-    bearing.only('stiffness', *_OF_CUT['bearing'], 'contact')
-    limits = limits_of(Machine, 'bearing_stiffness')
-    if (stiffness := bearing.number('stiffness', limits)) is not None:
-        machine['bearing_stiffness'] = stiffness
-    cut = _fields(bearing) | _contact(bearing)
-    if 'bearing' not in top.nodes and 'workpiece' in machine:
-        cut['bearing_contact'] = BearingContact.NONE
-    material.only(*_COEFFICIENT, *_OF_CUT['material'], 'errors')
-    found = material.numbers(_COEFFICIENT)
-    machine |= found
-    for figure, error in material.errors(found, _COEFFICIENT).items():
-        known = known.with_error(figure, error)
-    section = top.inner('cut')
-    section.only(*_OF_CUT['cut'])
-    cut |= _fields(material) | _fields(section)
-    if 'feed_per_revolution' in cut:  # the feed speed at the start; a feed of 0 is none
-        per_minute = cut['feed_per_revolution'] * cut.get('spindle_speed_rpm', _USUAL_SPEED)
-        cut.setdefault('feed_speed', per_minute / 60.0)
+        if part in top.nodes:
+            given[f'machine.{part}'], known = _body(top.inner(part), part, known)
+    if 'workpiece' in top.nodes and 'bearing' not in top.nodes:
+        given['cut.bearing_contact'] = BearingContact.NONE
+    for part, places in _IN_FILE.items():
+        section, rows = top.inner(part), {key: _ROWS[place] for key, place in places.items()}
+        found = section.values(rows, *_BESIDE.get(part, ()))
+        given |= {places[key]: value for key, value in found.items()}
+        for figure, error in _errors(section, found, _COEFFICIENT).items():
+            known = known.with_error(figure, error)
+    if 'cut.feed_per_revolution' in given:  # the feed speed at the start; a feed of 0 is none
+        per_second = given.get('cut.spindle_speed_rpm', Cut().spindle_speed_rpm) / 60.0
+        given.setdefault('cut.feed_speed', given['cut.feed_per_revolution'] * per_second)
+    owned = {owner: dict[str, Any]() for owner in ('machine', 'cut', '')}
+    for place, value in given.items():
+        owner, _, key = place.rpartition('.')
+        owned[owner][key] = value
     try:
-        made, usual = Machine(**machine), Cut(**cut)
+        machine, cut = Machine(**owned['machine']), Cut(**owned['cut'])
+        return MachineDescription(machine, cut, **owned[''], uncertainty=known or None, name=name)
     except ParameterError as error:
-        raise top.refused(str(error).rstrip('.')) from None
-    spindle = _spindle(top.inner('spindle'))
-    return MachineDescription(made, usual, **spindle, uncertainty=known or None, name=name)
+        section = top.inner('spindle') if error.name in owned[''] else top
+        raise section.refused(str(error).rstrip('.')) from None
 
 
-def _contact(section: Section) -> dict[str, Any]:
-    node, words = section.nodes.get('contact'), [choice.value for choice in BearingContact]
-    if node is None:
-        return {}
-    if text_of(node) not in words:
-        allowed = f'it must be one of {", ".join(words)}'
-        raise section.refused(f'contact is {text_of(node)!r}: {allowed}', node)
-    return {'bearing_contact': node.value}
-
-
-def _spindle(section: Section) -> dict[str, float]:
-    section.only(*_SPINDLE)
-    found = section.numbers(_SPINDLE)
-    slow, fast = found.get('slowest_speed', _SPEED.low), found.get('fastest_speed', _SPEED.high)
-    if not slow < fast:
-        raise section.refused(
-            f'fastest_speed is {fast:g} rev/min: it must be above slowest_speed, {slow:g} rev/min'
-        )
-    if 'acceleration' in found:
-        found['spindle_acceleration'] = found.pop('acceleration')
+def _errors(
+    section: Section, values: Mapping[str, float], rows: Mapping[str, Row]
+) -> dict[str, float]:
+    """Relative standard errors, given relative (`2 %`) or in the unit of the value."""
+    errors, found = section.inner('errors'), dict[str, float]()
+    errors.only(*rows)
+    for name, node in errors.nodes.items():
+        if name not in values:
+            raise errors.refused(f'{name} has an error here and no value beside it', node)
+        relative = str(node.value).rstrip().endswith('%')
+        unit, size = ('', 1.0) if relative else (rows[name].unit, abs(values[name]) or 1.0)
+        limits = Quantity('standard error', unit, high=_MOST_ERROR * size)
+        found[name] = errors.value(name, node, Row('', 0.0, '', limits)) / size
     return found
-
-
-def _fields(section: Section) -> dict[str, Any]:
-    """Those fields of a cut that a section has, by their names."""
-    names = _OF_CUT[section.path]
-    found = section.numbers({name: limits_of(Cut, field) for name, field in names.items()})
-    return {names[name]: value for name, value in found.items()}
 
 
 def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], Uncertainty]:
@@ -251,25 +227,22 @@ def _body(section: Section, part: str, known: Uncertainty) -> tuple[list[Mode], 
     section.only('modes', 'covariance')
     modes = []
     for k, entry in enumerate(section.items('modes')):
-        entry.only(*_MODE, 'errors')
-        found = entry.numbers(_MODE)
+        found = entry.values(_UNCERTAIN | _PARTS, 'errors')
         if missing := [name for name in ('frequency', 'damping_ratio') if name not in found]:
             raise entry.refused(f'it needs {missing[0]}')
         if ('mass' in found) == ('stiffness' in found):
             raise entry.refused('it needs either mass or stiffness')
-        errors = entry.errors(found, _UNCERTAIN)
-        text = entry.nodes['frequency'].value
-        omega = number_in(text, 'rad/s') if text.rstrip().endswith('rad/s') else None
-        omega = omega or _TURN * found['frequency']
-        mass = found['mass'] if 'mass' in found else found['stiffness'] / omega**2
-        parts = {name: found[name] for name in ('chip', 'force', 'bearing') if name in found}
+        known = known.with_mode(part, k, _errors(entry, found, _UNCERTAIN))
+        text, omega = entry.nodes['frequency'].value, _TURN * found.pop('frequency')
+        if text.rstrip().endswith('rad/s'):  # to the last bit
+            omega = number_in(text, 'rad/s')
+        if 'stiffness' in found:
+            found['mass'] = found.pop('stiffness') / omega**2
         try:
-            modes.append(Mode(mass, omega, found['damping_ratio'], **parts))
+            modes.append(Mode(natural_frequency=omega, **found))
         except ParameterError as error:
             raise entry.refused(str(error).rstrip('.')) from None
-        known = known.with_mode(part, k, errors)
-    node = section.nodes.get('covariance')
-    if node is not None:
+    if node := section.nodes.get('covariance'):
         try:
             matrix = np.array(yaml.safe_load(yaml.serialize(node)), float)
             known = known.with_covariance(part, len(modes), matrix)

@@ -16,7 +16,7 @@ from typing import Any, TypeGuard
 from lathe_chatter.errors import ParameterError, nearest_name
 from lathe_chatter.html_table import html_table
 from lathe_chatter.model.quantity_fields import Quantity, check_choice, quantity_of
-from lathe_chatter.model.values_with_units import number_in
+from lathe_chatter.model.values_with_units import number_in, units_of
 
 Value = bool | int | float | str | list[str]
 Values = Mapping[str, Value]
@@ -74,7 +74,7 @@ class Row:
         """
         if self.choices is not None:
             if not isinstance(value, str):
-                raise ParameterError(self.name, value, self.unit, self.allowed)
+                raise self._refused(value)
             return str(check_choice(self.name, value, self.choices).value)
         if isinstance(self.default, (list, tuple)):
             if isinstance(value, (list, tuple)) and all(isinstance(v, str) for v in value):
@@ -87,7 +87,14 @@ class Row:
                 return self.limits.check(self.name, value)
             if self.limits.low <= value <= self.limits.high:
                 return value
-        raise ParameterError(self.name, value, self.unit, self.allowed)
+        raise self._refused(value)
+
+    def _refused(self, value: object) -> ParameterError:
+        if self.unit and isinstance(value, str):  # it brought a unit, or tried to
+            return ParameterError(
+                self.name, value, '', f'{self.allowed}, in {units_of(self.unit)}'
+            )
+        return ParameterError(self.name, value, self.unit, self.allowed)
 
     def parsed(self, value: object) -> object:
         """The number that a text is, alone or with a unit (YAML takes `5.0e6` for a text)."""

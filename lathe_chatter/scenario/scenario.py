@@ -22,6 +22,7 @@ from lathe_chatter.errors import (
 from lathe_chatter.model.lathe_parameter_table import LATHE, MACHINE_FILE
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.model.quantity_fields import Quantity
+from lathe_chatter.shipped_files import shipped_files
 
 RECOMMENDED = 'recommended'
 """Stands for the speed that the monitor recommends."""
@@ -87,20 +88,7 @@ class Scenario:
 
 def shipped_scenarios() -> dict[str, Path]:
     """The scenario files of the package by name."""
-    return {file.stem: file for file in sorted(_shipped_folder().glob('*.yaml'))}
-
-
-def _shipped_folder() -> Path:
-    """config/scenarios of the installed package, or of the source tree."""
-    package = Path(__file__).resolve().parents[1]
-    places = [
-        package.parent / 'config' / 'scenarios',
-        *(
-            parent / 'share' / 'lathe_chatter' / 'config' / 'scenarios'
-            for parent in package.parents
-        ),
-    ]
-    return next((place for place in places if place.is_dir()), places[0])
+    return shipped_files('scenarios')
 
 
 def find_scenario(name_or_path: str) -> Path:

@@ -205,7 +205,7 @@ def test_an_atomic_set_takes_effect_at_one_instant(bench: Bench) -> None:
     [
         ({'depth_of_cut': 0.2}, 'depth_of_cut is 0.2 m: it must be a finite number from 0 to'),
         ({'depth_of_cut': float('nan')}, 'depth_of_cut is nan m: it must be'),
-        ({'depth_of_cut': 'deep'}, "depth_of_cut is 'deep' m: it must be"),
+        ({'depth_of_cut': 'deep'}, "depth_of_cut is 'deep': it must be"),
         ({'bearing_contact': 'loose'}, "bearing_contact is 'loose': it must be one of none, gap"),
         ({'sample_rate': 2e4}, 'sample_rate can be given at the start only.'),
         ({'use_sim_time': True}, 'use_sim_time can be given at the start only.'),
