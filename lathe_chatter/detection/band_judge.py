@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.detection.baseline import SETTLING
 from lathe_chatter.detection.block_loop import take_hops
 from lathe_chatter.detection.cut_identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
 from lathe_chatter.detection.detector_state import (
@@ -31,8 +32,10 @@ _DECAY = 32.0
 """Of the resonators, 1/s: as narrow as the growth of chatter allows."""
 _HOP = 0.01
 """Length of a hop, about, s: what is judged together, against the decay of the resonators."""
-_CARRIED = 1000
-"""Hops that an alarm of other sensors is said to be old: its advice stands."""
+ADVISED_LONG_AGO = 1000
+"""Age of an alarm that other sensors raised, hops: its advice stands."""
+TO_BE_ADVISED = 1 - SETTLING
+"""Age of an alarm for which another machine may know better advice, hops: it is sought again."""
 _UNSUSPICIOUS = 0.5
 """Score below which the machine may be corrected: the baseline begins anew with it."""
 _LINE_TURNS, _LINE_TIMES = 600.0, (0.15, 1.0)
@@ -69,8 +72,8 @@ class BandJudge:
         form: Of the samples.
         thresholds: As the user set them.
         adviser: Recommends speeds; its advice may be older than this.
-        alarmed: Whether there is an alarm already: that a sensor died, or came back, is no sign
-            that the chatter has ended.
+        alarm_age: Hops for which there has been an alarm already, as far as advice goes; None for
+            no alarm. That a sensor died, or came back, is no sign that the chatter has ended.
 
     Attributes:
         hop: Samples in a hop.
@@ -93,7 +96,7 @@ class BandJudge:
         form: StreamFormat,
         thresholds: Thresholds,
         adviser: SpeedAdviser,
-        alarmed: bool,  # noqa: FBT001
+        alarm_age: int | None,
     ) -> None:
         """Begin with nothing heard."""
         seen = form.angle and form.workpiece and not form.nominal
@@ -133,8 +136,8 @@ class BandJudge:
             deeper_root=middle,
             root_cutting=0.0,
             root_stiffness=machine.workpiece.stiffness if machine is not None else 0.0,
-            alarmed=alarmed,
-            since_alarm=_CARRIED if alarmed else 0,
+            alarmed=alarm_age is not None,
+            since_alarm=alarm_age or 0,
             peak_amplitude=0.0,
         )
         self._now = self.state.now[0]

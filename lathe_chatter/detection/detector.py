@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.band_judge import BandJudge, Thresholds
+from lathe_chatter.detection.band_judge import ADVISED_LONG_AGO, TO_BE_ADVISED, BandJudge, Thresholds
 from lathe_chatter.detection.detector_state import UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filters import HIGHEST_SEEN, UNKNOWN_MACHINE, Band, band_of, bands_of
@@ -76,6 +76,7 @@ class ChatterDetector:
         )
         self._nominal = nominal_rpm / 60.0
         self._advisers: list[SpeedAdviser] = []
+        self._advised = True
         self.set_machine(machine, first=True)
         self.reset()
 
@@ -137,8 +138,12 @@ class ChatterDetector:
             self._begin_with_machine()
 
     def _begin_with_machine(self) -> None:
+        # Whoever spoke last goes on, with what it has recommended, until something better is known.
+        if self._advisers:
+            self._advisers.insert(0, self._advisers.pop(self._speaker))
         for adviser in self._advisers:
-            adviser.machine = self._machine
+            adviser.judge_with(self._machine)
+        self._advised = False
         self._framer.restart_stretch()
         self._forget_format()
 
@@ -156,9 +161,11 @@ class ChatterDetector:
             self._prepared, self._mode = (form.rate, mode), mode
             while len(self._advisers) < len(bands):
                 self._advisers.append(SpeedAdviser(self._machine, self._speed_range))
-            alarmed, self._speaker = self._estimate.chatter, 0
+            age = ADVISED_LONG_AGO if self._advised else TO_BE_ADVISED
+            alarm_age = age if self._estimate.chatter else None
+            self._speaker, self._advised = 0, True
             self._judges = [
-                BandJudge(self._machine, band, form, self._thresholds, adviser, alarmed)
+                BandJudge(self._machine, band, form, self._thresholds, adviser, alarm_age)
                 for band, adviser in zip(bands, self._advisers, strict=False)
             ]
             listens = bool(bands) and (form.mixed or not form.angle)

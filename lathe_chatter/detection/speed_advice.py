@@ -326,7 +326,7 @@ class SpeedAdviser:
         speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
 
     Attributes:
-        machine: As given; it may be changed.
+        machine: As given, or as `judge_with` was told.
         advice: The one that stands.
     """
 
@@ -340,6 +340,12 @@ class SpeedAdviser:
     def forget(self) -> None:
         """There is no chatter."""
         self.advice = Advice()
+        self._error = math.inf
+        self._surely_grew = -math.inf
+
+    def judge_with(self, machine: Machine | None) -> None:
+        """Take another machine: what was recommended stands until there is an estimate with it."""
+        self.machine = machine
         self._error = math.inf
         self._surely_grew = -math.inf
 

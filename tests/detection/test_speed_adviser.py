@@ -87,3 +87,25 @@ def test_nothing_is_recommended_while_the_chatter_dies_down() -> None:
     assert not seen[-1].chatter
     dying = [estimate for estimate in seen if estimate.chatter][40:]
     assert not any(estimate.advice.speeds for estimate in dying)
+
+
+@pytest.mark.parametrize('after', [0.3, 3.0])
+def test_a_machine_that_is_told_amid_chatter_gives_advice_in_place_of_the_rule(
+    after: float,
+) -> None:
+    # So it is where the monitor takes the machine from a lathe that is slow to answer.
+    cut = Cut(spindle_speed_rpm=3000.0, depth_of_cut=0.5e-3, **_OPEN)
+    lathe = VirtualLathe(cut=cut)
+    detector = ChatterDetector(None, speed_range=_RANGE)
+    _watch(detector, lathe, 0.5)
+    lathe.retune(cut.with_changes(depth_of_cut=0.8e-3))
+    while not _watch(detector, lathe, 0.01)[-1].chatter:
+        assert lathe.time < 10.0
+    _watch(detector, lathe, after)
+    detector.set_machine(Machine())
+    seen = _watch(detector, lathe, 2.0)
+    assert all(estimate.chatter for estimate in seen)
+    assert all(math.isfinite(estimate.recommended_speed_rpm) for estimate in seen)
+    best = seen[-1].advice.speeds[0]
+    assert math.isnan(best.probability)  # no rule of thumb any more
+    assert _growth(Machine(), best.spindle_speed_rpm, 0.8e-3) < 0.0
