@@ -89,6 +89,7 @@ class _Question:
         self._list = node.create_client(ListParameters, f'{name}/list_parameters')
         self._due: float | None = None
         self._open: list[Any] = []
+        self._is_answered = False
 
     def look(self, on_values: Callable[[dict[str, Any]], None]) -> None:
         """Ask, if it is time to."""
@@ -103,7 +104,12 @@ class _Question:
 
     def _ask(self, on_values: Callable[[dict[str, Any]], None]) -> None:
         def get(names: Sequence[str]) -> None:
+            # The second list of names of a node that was asked twice: the clients may have gone.
+            if self._is_answered:
+                return
+
             def got(future: Any) -> None:
+                self._is_answered = True
                 found = map(parameter_value_to_python, future.result().values)
                 on_values(dict(zip(names, found, strict=False)))
 
