@@ -7,7 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.band_judge import ADVISED_LONG_AGO, TO_BE_ADVISED, BandJudge, Thresholds
+from lathe_chatter.detection.band_judge import (
+    ADVISED_LONG_AGO,
+    TO_BE_ADVISED,
+    BandJudge,
+    Thresholds,
+)
 from lathe_chatter.detection.detector_state import UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filters import HIGHEST_SEEN, UNKNOWN_MACHINE, Band, band_of, bands_of
@@ -138,7 +143,7 @@ class ChatterDetector:
             self._begin_with_machine()
 
     def _begin_with_machine(self) -> None:
-        # Whoever spoke last goes on, with what it has recommended, until something better is known.
+        # Whoever spoke last goes on: what it has recommended stands until better is known.
         if self._advisers:
             self._advisers.insert(0, self._advisers.pop(self._speaker))
         for adviser in self._advisers:
