@@ -128,8 +128,10 @@ class BandJudge:
             believed=1,
         )
         middle = complex(0.0, 2.0 * math.pi * band.middle)
+        # Ten times the smallest: what is identified from less than that is rounding as well.
+        smallest = 5.0 * thresholds.smallest_amplitude * float(self._settings['gain'][0])
         self.state = new_state(
-            self._kernels.poles.size,
+            np.maximum((smallest / (1.0 - np.abs(self._kernels.poles))) ** 2, 1e-300),
             smallest_amplitude=thresholds.smallest_amplitude,
             strictness=thresholds.strictness,
             root=middle,

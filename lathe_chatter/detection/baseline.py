@@ -142,7 +142,7 @@ def _close_block(state: DetectorState) -> None:
     count = now.blocks - LAG
     if count >= _FEWEST:
         for j in range(state.baseline.size):
-            state.baseline[j] = max(blocks[1 + LAG : 1 + LAG + count, j].mean(), 1e-300)
+            state.baseline[j] = max(blocks[1 + LAG : 1 + LAG + count, j].mean(), state.least[j])
 
 
 @compiled(inner=True)

@@ -61,7 +61,8 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
 @compiled(inner=True)
 def _meets_rail(channel: Any, value: float) -> bool:
     """Whether a value that has come some times in a row is a rail met once more."""
-    fast = channel.entry_step >= _RAIL_STEPS * channel.smallest_step
+    rounding = _ROUNDING * max(abs(channel.high), abs(channel.low))
+    fast = channel.entry_step >= _RAIL_STEPS * max(channel.smallest_step, rounding)
     if value >= channel.high:
         channel.high_hits = channel.high_hits + 1 if value == channel.high and fast else int(fast)
         channel.high = value

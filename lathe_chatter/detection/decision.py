@@ -59,6 +59,8 @@ _BESIDE_FORCED = 1.3
 """By how much surer growth must be beside a large vibration that is the spindle's own."""
 _STRICTER = 1.5
 """By how much surer growth must be without a model."""
+_SHORTEST_BY_ENERGY = 2
+"""The shortest window in which growth is read from the energy."""
 _PATIENT = 4
 """The shortest window whose growth is believed without a model."""
 _LOUD = 6.0
@@ -80,9 +82,9 @@ in which it must be so; hops that a peak must last."""
 
 
 @compiled(inner=True)
-def _surely_stable(windows: Records) -> bool:
-    """Whether one of the windows that know of a new cut at once says that it is stable."""
-    for number in range(_TRUSTED + 1):
+def _surely_stable(windows: Records, first: int, end: int) -> bool:
+    """Whether one of some windows says that the cut is stable."""
+    for number in range(first, end):
         known = windows[number]
         if known.growth < _SURELY_STABLE * known.growth_error:
             return True
@@ -103,8 +105,13 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
     """1 is an alarm."""
     now = state.now[0]
     score, rise = 0.0, now.rise
-    if model and now.hold_ended != 0 and not _grows(windows):
-        rise = np.nan  # it holds the rise over the cut before
+    if now.hold_ended != 0:  # the rise is that over the cut before
+        if model:
+            dies_down = not _grows(windows)
+        else:
+            dies_down = _surely_stable(windows, _SHORTEST_BY_ENERGY, windows.size)
+        if dies_down:
+            rise = np.nan
     short = windows[1] if model else windows[2]
     trust = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0) if model else 1.0
     sureness = short.growth / short.growth_error
@@ -118,7 +125,8 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
             score /= _ENERGY_ALONE
         if now.stepped != 0:
             score /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
-        if model and trust >= 0.5 and _surely_stable(windows):
+        first = 0 if model else _SHORTEST_BY_ENERGY
+        if trust >= 0.5 and _surely_stable(windows, first, _TRUSTED + 1):
             score = min(score, _VETO)
     loud = not model and rise > _LOUD and now.holding != 0
     free = model or loud or now.since_jump > 12
@@ -235,7 +243,7 @@ def judge(
     wave = (np.nan, np.nan, np.nan)
     if not model or now.rise > ARMED:
         fresh = now.since_jump - 2.0 - 1.0 / max(speed * period, 1e-9)
-        for number in range(2, WINDOWS.size):
+        for number in range(_SHORTEST_BY_ENERGY, WINDOWS.size):
             length = min(WINDOWS[number], HOPS - 1)
             mixed = now.holding != 0 and length > fresh
             if mixed or now.hops_seen < length + SETTLING:

@@ -53,6 +53,8 @@ class DetectorState(NamedTuple):
             (3, bins); the first complex.
         blocks: Mean energies in the blocks of the baseline (blocks, bins).
         baseline: Their mean, behind by a lag (bins,).
+        least: What it is at least: the energy of a vibration too small to be called chatter
+            (bins,). What is left of a cut that has settled without noise are roundings.
         speeds: Of the last hops, rev/s (SPEEDS,).
         amplitudes: Of the tool in the last hops, as a ring, m (HOPS,).
         line: Mean of the power of each resonator, and of its square (2, bins).
@@ -65,6 +67,7 @@ class DetectorState(NamedTuple):
     usual: Complex
     blocks: Array
     baseline: Array
+    least: Array
     speeds: Array
     amplitudes: Array
     line: Array
@@ -72,8 +75,9 @@ class DetectorState(NamedTuple):
     plain_scores: Array
 
 
-def new_state(bins: int, **values: object) -> DetectorState:
-    """Nothing known but the fields of `now` that are given."""
+def new_state(least: Array, **values: object) -> DetectorState:
+    """Nothing known but the least energy of each bin and the fields of `now` that are given."""
+    bins = least.size
     return DetectorState(
         record(
             _NOW,
@@ -90,6 +94,7 @@ def new_state(bins: int, **values: object) -> DetectorState:
         np.zeros((3, bins), complex),
         np.zeros((BLOCK_COUNT + LAG + 1, bins)),
         np.full(bins, np.nan),
+        least,
         np.zeros(SPEEDS),
         np.zeros(HOPS),
         np.zeros((2, bins)),

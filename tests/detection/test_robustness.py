@@ -16,11 +16,17 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import critical_depth, rightmost_root
 
 _BATCH = 100
+_HEAVY = Machine(
+    Mode(1.2, 2.0 * np.pi * 450.0, 0.025),
+    Mode(8.0, 2.0 * np.pi * 180.0, 0.04),
+    cutting_coefficient=1.2e9,
+)
+"""As somebody told it who tried the package."""
 _TOOL, _WORKPIECE = (
     SAMPLE_COLUMNS.index(f'{part}_displacement') for part in ('tool', 'workpiece')
 )
@@ -341,6 +347,39 @@ def test_who_joins_a_cut_that_has_settled_hears_no_chatter_in_its_roundings(begi
         estimate = detector.update(lathe.advance(100), SAMPLE_COLUMNS)
         assert not estimate.chatter
     assert estimate.state == 'stable'
+
+
+@pytest.mark.parametrize('told', [True, False])
+@pytest.mark.parametrize(
+    ('machine', 'cut', 'depth'),
+    [
+        (Machine(), _cut(0.5e-3, force_noise=0.0, sensor_noise=0.0), 0.62e-3),
+        (
+            _HEAVY,
+            _cut(0.3e-3, spindle_speed_rpm=2466.0, force_noise=0.0, sensor_noise=0.0),
+            0.2e-3,
+        ),
+        (
+            _HEAVY,
+            _cut(0.3e-3, spindle_speed_rpm=1500.0, force_noise=0.0, sensor_noise=0.0),
+            0.2e-3,
+        ),
+    ],
+)
+def test_another_depth_of_a_cut_without_noise_is_no_chatter_and_its_roundings_no_fault(
+    machine: Machine, cut: Cut, depth: float, told: bool
+) -> None:
+    # What is left of it after some seconds are roundings, against which a step is a giant.
+    assert rightmost_root(machine, cut.spindle_speed_rpm, depth, seated=False).real < 0.0
+    detector = ChatterDetector(machine if told else None)
+    for begins in (3.0, 3.004, 3.01):
+        detector.reset()
+        lathe = VirtualLathe(machine, cut)
+        seen = _watch(detector, lathe.advance(round(begins * 1e4)))
+        lathe.retune(cut.with_changes(depth_of_cut=depth))
+        seen += _watch(detector, lathe.advance(50_000))
+        assert not any(estimate.chatter for estimate in seen)
+        assert not any(estimate.faults for estimate in seen)
 
 
 def test_a_cutting_coefficient_that_cannot_be_there_costs_no_advice() -> None:
