@@ -18,7 +18,7 @@ from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.decoding import Recorded, decoded
 from lathe_chatter.recording.mcap_chunk_walk import Damage
 from lathe_chatter.recording.recorded_file import Contents, Note, Raw, RecordedFile
-from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
+from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks, one_cut
 from lathe_chatter.recording.sample_order import sample_blocks
 from lathe_chatter.recording.sample_series import Samples, joined, selection
 from lathe_chatter.samples.codec import SAMPLES_TYPE
@@ -142,17 +142,19 @@ class Run:
         columns: Iterable[str] | None = None,
         start: float = -np.inf,
         end: float = np.inf,
+        cut: int | None = None,
     ) -> Samples:
-        """The samples of a lathe, joined.
+        """The samples of a lathe, joined; `gaps` and `restarts` say where.
 
         Args:
             topic: Of the samples; may be left out where the run has one lathe.
             columns: Which signals; all by default.
             start: Simulated time of the first wanted, s.
             end: Simulated time of the last wanted, s.
+            cut: Those of one cut alone, the first being 0; a reset or a new lathe begins another.
 
         Raises:
-            ParameterError: If columns or times are no such thing.
+            ParameterError: If columns, times or cut are no such thing.
             RunReadError: If a file is damaged, there are no samples, no such columns, or several
                 lathes and no topic is named.
             LayoutError: If a message is no block of samples.
@@ -160,7 +162,8 @@ class Run:
         name = topic or self.samples_topic()
         wanted = selection(name, columns, start, end)
         expected = sum(file.count(name) for file in self.opened)
-        found = joined(self.sample_blocks(name, wanted.columns), expected, wanted)
+        blocks = self.sample_blocks(name, wanted.columns)
+        found = joined(blocks if cut is None else one_cut(blocks, cut), expected, wanted)
         if found is None:
             raise self.without_samples(name)
         missing = sorted(set(wanted.columns or ()) - set(found.columns))
@@ -219,7 +222,7 @@ class Run:
         """The samples as a pandas DataFrame by simulated time; see `dataframes.to_pandas`.
 
         Args:
-            chosen: Topic, columns, start and end, as for `samples`.
+            chosen: Topic, columns, start, end and cut, as for `samples`.
 
         Raises:
             MissingPackageError: If pandas is not installed.
@@ -231,7 +234,7 @@ class Run:
         """The samples as an xarray Dataset over simulated time; see `dataframes.to_xarray`.
 
         Args:
-            chosen: Topic, columns, start and end, as for `samples`.
+            chosen: Topic, columns, start, end and cut, as for `samples`.
 
         Raises:
             MissingPackageError: If xarray is not installed.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array, Integers
-from lathe_chatter.errors import LayoutError
+from lathe_chatter.errors import LayoutError, ParameterError
 from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.samples.codec import BlockLayout, block_layout
 
@@ -72,6 +72,42 @@ class SampleBlocks(NamedTuple):
             self.log_times[order],
             self.publish_times[order],
         )
+
+    def some(self, begin: int, end: int) -> SampleBlocks:
+        """The blocks from one up to another."""
+        ends = np.concatenate(([0], np.cumsum(self.rows)))
+        return SampleBlocks(
+            self.columns,
+            self.signals[:, ends[begin] : ends[end]],
+            self.rows[begin:end],
+            self.log_times[begin:end],
+            self.publish_times[begin:end],
+        )
+
+
+def one_cut(parts: Iterable[SampleBlocks], wanted: int) -> Iterator[SampleBlocks]:
+    """The blocks of one cut: a new one begins where simulated time goes back.
+
+    Args:
+        parts: All blocks, in order.
+        wanted: The number of the cut, the first being 0.
+
+    Raises:
+        ParameterError: If there is no such cut.
+    """
+    cut, last = 0, -np.inf
+    for part in parts:
+        some = np.flatnonzero(part.rows)
+        if not some.size:
+            continue
+        first, end = part.spans[:, some]
+        cuts = cut + np.cumsum(~(first > np.concatenate(([last], end[:-1]))))
+        cut, last = int(cuts[-1]), float(end[-1])
+        chosen = some[cuts == wanted]
+        if chosen.size:
+            yield part.some(int(chosen[0]), int(chosen[-1]) + 1)
+    if wanted not in range(cut + 1):
+        raise ParameterError('cut', wanted, '', f'a whole number from 0 to {cut}')
 
 
 class Stretch(NamedTuple):

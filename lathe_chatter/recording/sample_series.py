@@ -114,9 +114,14 @@ class Samples(NamedTuple):
         count = len(self.block_ends) and len(next(iter(self.columns.values())))
         times = self.columns.get('time', self.block_ends)
         span = f' from {times[0]:g} to {times[-1]:g} s' if len(times) else ''
-        missing = f', {len(self.gaps)} gaps' if self.gaps else ''
-        again = f', {len(self.restarts)} restarts' if self.restarts else ''
-        return f'<Samples: {count} of {", ".join(self.columns)}{span}{missing}{again}>'
+        breaks = _broken_at('gap', self.gaps) + _broken_at('restart', self.restarts)
+        return f'<Samples: {count} of {", ".join(self.columns)}{span}{breaks}>'
+
+
+def _broken_at(name: str, places: list[tuple[float, float]]) -> str:
+    """How often something breaks the samples, and where first."""
+    times = ', '.join([f'{before:g}' for before, _ in places[:3]] + ['...'] * (len(places) > 3))
+    return f', {len(places)} {name}{"s" * (len(places) > 1)} at {times} s' if places else ''
 
 
 def joined(blocks: Iterable[SampleBlocks], expected: int, wanted: Selection) -> Samples | None:

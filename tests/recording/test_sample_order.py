@@ -12,6 +12,7 @@ from mcap.writer import Writer as McapWriter
 from support.recorded import ARRAY, topic
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.recording import read_run, verify
 from lathe_chatter.samples.codec import encode_block
@@ -92,3 +93,40 @@ def test_a_reset_stays_a_reset(samples: Array, tmp_path: Path) -> None:
     found = read_run(file).samples()
     assert found.columns['time'].tobytes() == twice[:, 0].tobytes()
     assert found.restarts == [(samples[ROWS * 700 - 1, 0], samples[0, 0])]
+
+
+@pytest.mark.parametrize('lengths', [[700, 500], [3, 1, 700, 496], [500, 500, 200]], ids=str)
+def test_each_cut_is_had_by_itself(lengths: list[int], samples: Array, tmp_path: Path) -> None:
+    cuts = [samples[: ROWS * length] for length in lengths]
+    file = write(
+        tmp_path / 'cuts_0.mcap',
+        np.concatenate(cuts),
+        range(BLOCKS),
+        START + TICK * np.arange(BLOCKS),
+    )
+    run = read_run(file)
+    place = 0
+    for number, (cut, length) in enumerate(zip(cuts, lengths, strict=True)):
+        found = run.samples(cut=number)
+        assert np.column_stack([*found.columns.values()]).tobytes() == cut.tobytes()
+        assert found.restarts == found.gaps == []
+        begun = START + TICK * place
+        assert found.log_times.tolist() == [begun + TICK * k for k in range(length)]
+        place += length
+    late = run.samples(columns=['tool_velocity'], start=0.3, end=0.4, cut=len(cuts) - 1)
+    times = cuts[-1][:, 0]
+    inside = cuts[-1][(times >= 0.3) & (times <= 0.4), 3]
+    assert late.columns['tool_velocity'].tolist() == inside.tolist()
+    for none in (len(cuts), -1, 0.5):
+        with pytest.raises(ParameterError, match=f'a whole number from 0 to {len(cuts) - 1}'):
+            run.samples(cut=none)  # type: ignore[arg-type]  # as a caller may
+
+
+def test_what_is_joined_says_so(samples: Array, tmp_path: Path) -> None:
+    twice = np.concatenate((samples[: ROWS * 700], samples[: ROWS * 500]))
+    file = write(tmp_path / 'reset_0.mcap', twice, range(BLOCKS), START + TICK * np.arange(BLOCKS))
+    found = read_run(file).samples(columns=['tool_velocity'], start=0.3, end=0.4)
+    assert len(found.columns['tool_velocity']) == 2002
+    assert found.gaps == []
+    assert found.restarts == [(0.4, 0.3)]
+    assert repr(found).endswith(', 1 restart at 0.4 s>')
