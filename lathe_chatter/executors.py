@@ -12,6 +12,7 @@ import itertools
 import math
 import multiprocessing
 import os
+import pickle
 import platform
 import signal
 import threading
@@ -28,10 +29,9 @@ from lathe_chatter.fingerprint import code_identity, processor_name
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')
-Progress = Callable[[int], object]
 
 _AHEAD, _PER_WORKER = 2, 4
-"""Batches that are out at once, and batches in all where nothing is said, for each worker."""
+"""Batches that are out at once, and batches in all, for each worker."""
 RETRIES = 3
 
 
@@ -48,8 +48,7 @@ def spread(
     items: Sequence[Item],
     *,
     executor: Executor | None = None,
-    batch: int | None = None,
-    progress: Progress = lambda _count: None,
+    progress: Callable[[int], object] = lambda _count: None,
 ) -> list[Result]:
     """The results of a function of each item, in the order of the items.
 
@@ -57,13 +56,12 @@ def spread(
         function: Of one item; for other processes one that they can import.
         items: What it is called with.
         executor: Where; threads, one a core, where None.
-        batch: Items that go out together; a task costs some milliseconds on other machines.
         progress: Is told, now and then, how many more are done.
 
     Raises:
         WorkerError: If workers are lost, or have another version.
     """
-    batches = batches_of(items, executor, batch)
+    batches = batches_of(items, executor)
     found: list[list[Result]] = [[] for _ in batches]
     for done in run_batches(function, batches, executor=executor):
         found[done.place] = done.results
@@ -71,11 +69,9 @@ def spread(
     return list(itertools.chain.from_iterable(found))
 
 
-def batches_of(
-    items: Sequence[Item], executor: Executor | None, size: int | None = None
-) -> list[Sequence[Item]]:
-    """Items as they go out together: some batches for each worker where no size is said."""
-    size = size or max(1, math.ceil(len(items) / (_PER_WORKER * width_of(executor))))
+def batches_of(items: Sequence[Item], executor: Executor | None) -> list[Sequence[Item]]:
+    """Items as they go out together, as a task costs some milliseconds on other machines."""
+    size = max(1, math.ceil(len(items) / (_PER_WORKER * width_of(executor))))
     return [items[k : k + size] for k in range(0, len(items), size)]
 
 
@@ -86,9 +82,10 @@ def run_batches(
     executor: Executor | None,
 ) -> Iterator[Done]:
     """`spread`, each batch as it comes back; no more are out than keep the workers busy."""
-    waiting, processors = iter(enumerate(batches)), set[str]()
-    running: dict[Future[tuple[list[Any], str]], int] = {}
-    task = partial(_work, code_identity(), function)
+    packed = hasattr(executor, '_client')  # Dask would send each array by itself
+    waiting = enumerate(map(pickle.dumps, batches) if packed else batches)
+    running: dict[Future[tuple[Any, str]], int] = {}
+    task, processors = partial(_work, code_identity(), function), set[str]()
     with nullcontext(executor) if executor else futures.ThreadPoolExecutor(cores()) as pool:
         try:
             for place, batch in itertools.islice(waiting, _AHEAD * width_of(pool)):
@@ -100,6 +97,7 @@ def run_batches(
                         running[pool.submit(task, batch)] = place
                     results, processor = future.result()
                     processors.add(processor)
+                    results = pickle.loads(results) if packed else results  # noqa: S301 -- ours
                     yield Done(here, results, processor)
         except (futures.BrokenExecutor, futures.CancelledError):
             reason = 'killed, perhaps for want of memory, or without their scheduler'
@@ -114,12 +112,14 @@ def run_batches(
         warnings.warn(f'Last bits may differ between the processors {names}.', stacklevel=2)
 
 
-def _work(code: str, function: Callable[[Item], Any], batch: Sequence[Item]) -> Any:
+def _work(code: str, function: Callable[[Item], Any], batch: Sequence[Item] | bytes) -> Any:
     """What a worker does."""
     if code != code_identity():
         other = f'The worker {platform.node()} computes with {code_identity()}'
         raise WorkerError(f'{other} and not, as asked, with {code}: install the same on both.')
-    return [function(item) for item in batch], processor_name()
+    if not isinstance(batch, bytes):
+        return [function(item) for item in batch], processor_name()
+    return pickle.dumps([function(item) for item in pickle.loads(batch)]), processor_name()  # noqa: S301 -- ours
 
 
 def cores() -> int:

@@ -59,7 +59,7 @@ def test_the_same_bits_from_everyone(executor: Executor) -> None:
 
 def test_a_mistake_comes_back_as_it_was_made(executor: Executor) -> None:
     with pytest.raises(ParameterError, match='it must be below 3') as found:
-        spread(refused, range(9), executor=executor, batch=1)
+        spread(refused, range(9), executor=executor)
     assert found.value.name == 'number'
 
 
@@ -70,7 +70,7 @@ def test_a_worker_that_is_killed_is_made_up_for(kind: str, tmp_path: Path) -> No
     work = partial(square_unless_killed, mark=tmp_path / 'killed')
     told: list[int] = []
     with KINDS[kind]() as executor:
-        found = spread(work, range(12), executor=executor, batch=1, progress=told.append)
+        found = spread(work, range(12), executor=executor, progress=told.append)
     assert (tmp_path / 'killed').exists()
     assert found == [n * n for n in range(12)]
     assert sum(told) == 12
@@ -79,12 +79,12 @@ def test_a_worker_that_is_killed_is_made_up_for(kind: str, tmp_path: Path) -> No
 def test_a_pool_of_the_users_own_that_breaks_is_a_sentence(tmp_path: Path) -> None:
     work = partial(square_unless_killed, mark=tmp_path / 'killed')
     with ProcessPoolExecutor(2) as pool, pytest.raises(WorkerError, match='workers are gone'):
-        spread(work, range(12), executor=pool, batch=1)
+        spread(work, range(12), executor=pool)
 
 
 def test_what_kills_every_worker_ends_in_a_sentence() -> None:
     with Processes(1) as pool, pytest.raises(WorkerError, match='workers are gone'):
-        spread(fatal, range(3), executor=pool, batch=1)
+        spread(fatal, range(3), executor=pool)
     with Processes(1) as pool:
         assert isinstance(pool.submit(fatal, 0).exception(), BrokenExecutor)
 
@@ -102,7 +102,7 @@ def test_where_processors_differ_that_is_said(monkeypatch: pytest.MonkeyPatch) -
     names = iter('ABCDEFGH')
     monkeypatch.setattr(executors, 'processor_name', lambda: next(names))
     with pytest.warns(UserWarning, match='between the processors A, B'):
-        spread(square, [1, 2], batch=1)
+        spread(square, [1, 2])
 
 
 def test_no_more_is_begun_than_keeps_the_workers_busy() -> None:

@@ -99,7 +99,7 @@ def _rule_figures(trials: list[Trial]) -> str:
 def advice_figures(random: int, executor: Executor) -> list[str]:
     """Both tables."""
     trials = _trials(random)
-    outcomes = spread(judge, trials, executor=executor, batch=2)
+    outcomes = spread(judge, trials, executor=executor)
     lines = []
     for label, found in (
         ('8 machine states', outcomes[:8]),

@@ -101,7 +101,7 @@ def limit_cycle(case: Case) -> float:
 def limit(options: Any) -> list[str]:
     """The monitor started late."""
     cases = [scenarios.saturated(k) for k in range(4 if options.quick else 40)]
-    found = np.array(spread(limit_cycle, cases, executor=options.executor, batch=2))
+    found = np.array(spread(limit_cycle, cases, executor=options.executor))
     half, most = quantiles(found)
     said = f'said after {1e3 * half:.0f} / {1e3 * most:.0f} ms, {int(np.isinf(found).sum())} not'
     return [f'switched on in saturated chatter: {len(cases)} cases, {said}']

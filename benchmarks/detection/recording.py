@@ -80,6 +80,5 @@ def run(cases: Sequence[Case], label: str, executor: Executor) -> list[Traces]:
             record,
             cases,
             executor=executor,
-            batch=2,
             progress=lambda count: progress.advance(bar, count),
         )

@@ -164,7 +164,7 @@ def wrong(options: Any) -> list[str]:
         for machine in told.values()
         for k in range(number)
     ]
-    found = spread(hear, worlds, executor=options.executor, batch=2)
+    found = spread(hear, worlds, executor=options.executor)
     groups = [found[k * number : (k + 1) * number] for k in range(len(told))]
     lines = [f'machines told wrong: {number} onsets each, after 3 stable cuts of 5 s']
     return lines + [
@@ -226,7 +226,7 @@ def machines(options: Any) -> list[str]:
     for k, (machine, rate) in enumerate(ten_machines()):
         for told in (True, False):
             worlds = [_world_of_size(k, _UNTUNED + n, told=told) for n in range(number)]
-            found = spread(hear, worlds, executor=options.executor, batch=2)
+            found = spread(hear, worlds, executor=options.executor)
             everything[told] += found
             hertz = machine.tool.natural_frequency / (2.0 * math.pi)
             label = f'{hertz:.0f} Hz, {machine.tool.mass:.3g} kg, {rate / 1e3:.1f} kHz'
@@ -245,7 +245,7 @@ def sensors(options: Any) -> list[str]:
     lines, base = [f'sensors: {number} onsets each on the same cuts, machine told'], None
     for heard in ('displacements', 'accelerations', 'one', 'sound'):
         worlds = [_paper_world(MACHINE, heard, _UNTUNED + k, 3.0) for k in range(number)]
-        found = spread(hear, worlds, executor=options.executor, batch=2)
+        found = spread(hear, worlds, executor=options.executor)
         lines.append(_line(heard, found, base))
         base = base or found
     return [each.replace('of none', 'of displacements') for each in lines]
@@ -260,7 +260,7 @@ def air(options: Any) -> list[str]:
             World(told, 'displacements', NOISES['S1'], STATES[k % 4][0], (0.0,), 20.0, 0.0, k)
             for k in range(number)
         ]
-        found = spread(hear, worlds, executor=options.executor, batch=2)
+        found = spread(hear, worlds, executor=options.executor)
         name = 'told' if told else 'not told'
         lines.append(f'  machine {name}: {sum(f.false for f in found)} of {number} flagged')
     return lines

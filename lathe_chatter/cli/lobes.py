@@ -31,6 +31,7 @@ from lathe_chatter.report.probability_chart import (
     SURE,
     cut_probability,
     probability_sentence,
+    probable_speeds,
 )
 from lathe_chatter.report.stability_chart import (
     chart_limits,
@@ -124,7 +125,7 @@ def run(options: Namespace) -> int:
             if options.map or config.cut.speed_variation_amplitude > 0.0:
                 growth = _map(config, low, high, top, SpeedLaw(options.law), wide)
             elif known:
-                probability = _probability(config, known, low, high, wide)
+                probability = _probability(config, known, limits, wide)
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {kept}.')
         return INTERRUPTED
@@ -196,7 +197,7 @@ def _uncertainty(options: Namespace, config: LatheConfig) -> Uncertainty | None:
 
 
 def _probability(
-    config: LatheConfig, known: Uncertainty, low: float, high: float, wide: _Wide
+    config: LatheConfig, known: Uncertainty, limits: SafeLimit, wide: _Wide
 ) -> StabilityProbability:
     """How probable it is to be stable, over the chart."""
     with wide.screen.progress('machines as the truth may be', _PROBABLE_MACHINES) as bar:
@@ -204,7 +205,7 @@ def _probability(
             config.machine,
             known,
             config.cut,
-            np.linspace(low, high, _PROBABLE_SPEEDS),
+            probable_speeds(limits, _PROBABLE_SPEEDS),
             machines=_PROBABLE_MACHINES,
             tool_leaves_cut=config.setup.tool_leaves_cut,
             executor=wide.executor,

@@ -9,8 +9,7 @@ import warnings
 from pathlib import Path
 
 from lathe_chatter.dataset.plan import Form
-from lathe_chatter.dataset.random_draws import DrawnRun
-from lathe_chatter.dataset.windows import Table
+from lathe_chatter.dataset.windows import DrawnRun, Table
 from lathe_chatter.errors import optional
 from lathe_chatter.lathe.cut_event_sentences import Knock
 

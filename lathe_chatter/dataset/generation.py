@@ -19,8 +19,7 @@ from jinja2 import StrictUndefined, Template
 
 from lathe_chatter.dataset.file_formats import ENDINGS, Files, files_of, read_part
 from lathe_chatter.dataset.plan import Form, Plan
-from lathe_chatter.dataset.random_draws import drawn_machine
-from lathe_chatter.dataset.windows import Table, windows_of
+from lathe_chatter.dataset.windows import Table, drawn_machine, windows_of
 from lathe_chatter.errors import DatasetError, reason_of
 from lathe_chatter.executors import run_batches
 from lathe_chatter.fingerprint import code_identity
@@ -54,8 +53,10 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
     count, digest = len(table['machine']), hashlib.sha256()
     for values in table.values():
         digest.update(np.ascontiguousarray(values).data)
-    described = {k: c.described or MachineDescription() for k, c in machines.items()}
-    texts = {k: replace(d, machine=machines[k].machine).text() for k, d in described.items()}
+    described = {
+        number: replace(config.described or MachineDescription(), machine=config.machine)
+        for number, config in machines.items()
+    }
     return files, {
         'part': part[0],
         'windows': count,
@@ -63,7 +64,7 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
         'ended_early': len(runs) * len(plan.starts) - count,
         'windows_sha256': digest.hexdigest(),
         'files': {n: [len(b), hashlib.sha256(b).hexdigest()] for n, b in files.items()},
-        'machines': {number: json.loads(text) for number, text in texts.items()},
+        'machines': {number: machine.sections() for number, machine in described.items()},
     }
 
 
@@ -100,7 +101,16 @@ def make_dataset(
         with closing(ResultFile(manifest, header)) as file:
             for left in folder.glob('*/.*.partial'):  # by a process that was killed
                 _remove(left)
-            entries = _made(plan, folder, file, executor, progress)
+            there = {entry['part']: entry for entry in file.entries if _is_there(folder, entry)}
+            missing = [[part] for part in parts_of(plan).items() if part[0] not in there]
+            progress(sum(entry['windows'] for entry in there.values()), plan.windows)
+            for done in run_batches(partial(make_part, plan), missing, executor=executor):
+                ((files, entry),) = done.results
+                _write(folder / entry['part'], files)
+                there[entry['part']] = {**entry, 'processor': done.processor}
+                file.add(there[entry['part']])
+                progress(sum(entry['windows'] for entry in there.values()), plan.windows)
+        entries = [there[name] for name in parts_of(plan)]
         template = package_files(__package__).joinpath('card.md.j2').read_text(encoding='utf-8')
         card = Template(template, undefined=StrictUndefined)
         text = card.render(plan=plan, header=header, parts=entries, units=UNITS, table=LATHE)
@@ -113,26 +123,6 @@ def make_dataset(
             'whole, and the same call goes on from it.'
         ) from None
     return entries
-
-
-def _made(
-    plan: Plan, folder: Path, file: ResultFile, executor: Executor | None,
-    progress: Callable[[int, int], object],
-) -> list[dict[str, Any]]:  # fmt: skip
-    """Make what is missing; what the manifest says of each part."""
-    entries = {entry['part']: entry for entry in file.entries if _is_there(folder, entry)}
-    parts = parts_of(plan)
-    missing = [[part] for part in parts.items() if part[0] not in entries]
-    there = sum(entry['windows'] for entry in entries.values())
-    progress(there, plan.windows)
-    for done in run_batches(partial(make_part, plan), missing, executor=executor):
-        ((files, entry),) = done.results
-        _write(folder / entry['part'], files)
-        entries[entry['part']] = {**entry, 'processor': done.processor}
-        file.add(entries[entry['part']])
-        there += entry['windows']
-        progress(there, plan.windows)
-    return [entries[name] for name in parts]
 
 
 def _is_there(folder: Path, entry: dict[str, Any]) -> bool:

@@ -96,7 +96,7 @@ class MachineDescription:
 
     def text(self) -> str:
         """The same as one line of JSON, which `load_machine` takes: to the last bit."""
-        return json.dumps(self._sections())
+        return json.dumps(self.sections())
 
     def save(self, path: Path | str) -> None:
         """Write a machine file.
@@ -104,13 +104,14 @@ class MachineDescription:
         Raises:
             MachineFileError: If it cannot be written.
         """
-        text = yaml.safe_dump(self._sections(), sort_keys=False, default_flow_style=None)
+        text = yaml.safe_dump(self.sections(), sort_keys=False, default_flow_style=None)
         try:
             Path(path).write_text(text, encoding='utf-8')
         except OSError as error:
             raise MachineFileError(f'{path} cannot be written: {reason_of(error)}.') from None
 
-    def _sections(self) -> dict[str, Any]:
+    def sections(self) -> dict[str, Any]:
+        """The same as plain values by section, as the file has them."""
         known, made = self.uncertainty or Uncertainty(), dict[str, Any]()
         for name in ('tool', 'workpiece'):
             body: Body = getattr(self.machine, name)

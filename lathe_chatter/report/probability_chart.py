@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.signal import argrelmin
 
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut
 from lathe_chatter.plot_style import SAFE
 from lathe_chatter.stability.probability import StabilityProbability
+from lathe_chatter.stability.safe_limit import SafeLimit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,6 +59,29 @@ def probability_sentence(cut: Cut, probability: StabilityProbability) -> str:
     if repeat:
         said += f' Worth measuring again, by their share: {", ".join(repeat)}.'
     return said
+
+
+def probable_speeds(limits: SafeLimit, count: int) -> Array:
+    """Speeds for a chart of probability: evenly spaced, but at each minimum of the limit.
+
+    Where lobes are narrower than the spacing, the chart then shows the depth that is safe in all
+    of them, and not that of speeds that happen to lie between two.
+
+    Args:
+        limits: Of the machine as it is told, over rising speeds.
+        count: How many.
+
+    Returns:
+        Rising from the first to the last of the limits' speeds, rev/min (count,).
+    """
+    speeds, depths = limits.spindle_speed_rpm, limits.depth_of_cut
+    found = np.linspace(speeds[0], speeds[-1], count)
+    lowest = argrelmin(depths)[0]
+    lowest = lowest[np.argsort(-depths[lowest], kind='stable')]  # the deepest of a cell comes last
+    cells = np.searchsorted(0.5 * (found[1:] + found[:-1]), speeds[lowest])
+    inside = (cells > 0) & (cells < count - 1)
+    found[cells[inside]] = speeds[lowest[inside]]
+    return found
 
 
 def draw_probability(axes: Axes, chart: StabilityProbability, depth_limit: float) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.dataset.plan import load_plan
-from lathe_chatter.dataset.random_draws import drawn_machine, drawn_run
+from lathe_chatter.dataset.windows import drawn_machine, drawn_run
 from lathe_chatter.errors import PlanError
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.stability import safe_limit

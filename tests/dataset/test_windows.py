@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.dataset.plan import Plan, load_plan
-from lathe_chatter.dataset.random_draws import drawn_machine, drawn_run
-from lathe_chatter.dataset.windows import windows_of
+from lathe_chatter.dataset.windows import drawn_machine, drawn_run, windows_of
 from lathe_chatter.stability import contact_at, rightmost_root
 
 TEXT = """
