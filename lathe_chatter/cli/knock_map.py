@@ -84,15 +84,18 @@ def run(options: Namespace) -> int:
     )  # fmt: skip
     files = files_of_picture(options.output)
     if options.output in files:
-        raise ParameterError('--output', str(options.output), '', 'no name of a picture')
+        allowed = 'no name of a picture, which is drawn beside it, but one as knocks.jsonl'
+        raise ParameterError('--output', str(options.output), '', allowed)
     if not options.output.exists():  # else they are pictures of it
         keep_existing(*files, force=options.force)
     screen = Screen(json=options.json)
     points = len(speeds) * len(depths) * len(clearances)
     if 1 < points < _FEW:
+        axes = {'speeds': speeds, 'depths': depths, 'clearances': clearances}
+        name, values = max(axes.items(), key=lambda axis: len(axis[1]))
         screen.say(
             f'A map of {points} points shows no shape: give axes more values, as '
-            '--speeds 2000:6000:15 --depths 0.0004:0.0008:9.'
+            f'--{name} {values[0]:g}:{values[-1]:g}:15.'
         )
     screen.compile()
     try:
