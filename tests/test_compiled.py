@@ -51,8 +51,8 @@ def test_a_cache_that_cannot_be_written_is_made_elsewhere(tmp_path: Path) -> Non
     assert last == str(tmp_path / f'lathe_chatter-{os.getuid()}')
     assert stat.S_IMODE(Path(last).stat().st_mode) == 0o700
     small = (
-        'import os\nfrom lathe_chatter.lathe.integrator.spindle import turned\n'
-        'print(turned(1.0, 50.0, 0.0, 0.0, 0.0, 0.0))'
+        'import os\nfrom lathe_chatter.lathe.integrator.random_numbers import standard_normal\n'
+        'print(standard_normal(0, 0, 0))'
     )
     done = run(small, TMPDIR=str(tmp_path), **environment)
     assert done.returncode == 0, done.stderr

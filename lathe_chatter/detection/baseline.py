@@ -55,7 +55,7 @@ SETTLING = 20
 """Hops after which something is known."""
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow_energy(state: DetectorState, newest: int) -> int:
     """Baselines and innovations of the resonators; the strongest bin of the last two hops."""
     now = state.now[0]
@@ -105,7 +105,7 @@ def follow_energy(state: DetectorState, newest: int) -> int:
     return strongest
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow_lines(state: DetectorState, newest: int) -> int:
     """Mean power of every resonator, and of its square; the loudest of them."""
     now = state.now[0]
@@ -121,7 +121,7 @@ def follow_lines(state: DetectorState, newest: int) -> int:
     return loudest
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def hold(now: Any) -> None:
     """Take no rise of energy for chatter until the disturbance is over."""
     now.since_jump = 0
@@ -129,7 +129,7 @@ def hold(now: Any) -> None:
         now.holding = max(now.holding, 1)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _close_block(state: DetectorState) -> None:
     """Put the block that is full behind the others and renew the baseline."""
     blocks, now = state.blocks, state.now[0]
@@ -142,10 +142,13 @@ def _close_block(state: DetectorState) -> None:
     count = now.blocks - LAG
     if count >= _FEWEST:
         for j in range(state.baseline.size):
-            state.baseline[j] = max(blocks[1 + LAG : 1 + LAG + count, j].mean(), state.least[j])
+            total = 0.0
+            for row in range(1 + LAG, 1 + LAG + count):
+                total += blocks[row, j]
+            state.baseline[j] = max(total / count, state.least[j])
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def restart_baseline(state: DetectorState) -> None:
     """What was usual is so no more."""
     now = state.now[0]
@@ -154,7 +157,7 @@ def restart_baseline(state: DetectorState) -> None:
     state.baseline[:] = np.nan
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def growth_by_energy(
     state: DetectorState, newest: int, bin_: int, length: int, period: float, pole: complex
 ) -> tuple[float, float, float]:
@@ -176,7 +179,7 @@ def growth_by_energy(
     return math.log(size) / period, error, math.atan2(turn.imag, turn.real) / period
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow_phase(state: DetectorState, phases: Array) -> None:
     """Once-per-turn spread and what part of all vibration it is."""
     within = mean = total = 0.0
@@ -194,7 +197,7 @@ def follow_phase(state: DetectorState, phases: Array) -> None:
     now.once_per_turn = within / (within + total) if known else np.nan
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow_speed(state: DetectorState, speed: float, hops_a_turn: float) -> None:
     """Notice ramps; they are over when a turn has passed, and what was usual is so no more."""
     speeds, now = state.speeds, state.now[0]
@@ -212,7 +215,7 @@ def follow_speed(state: DetectorState, speed: float, hops_a_turn: float) -> None
         now.ramping = int(_RAMP_HOLD + hops_a_turn)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow_push(state: DetectorState, products: Records, newest: int) -> None:
     """Notice a step of the mean force: another cut, whose vibration may stay larger than before.
 
@@ -239,7 +242,7 @@ def follow_push(state: DetectorState, products: Records, newest: int) -> None:
         now.stepped = _STEP_HOLD
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow_misfit(state: DetectorState, products: Any, clear: bool) -> None:
     """What the force usually differs by from C w h, while nothing happens."""
     now = state.now[0]

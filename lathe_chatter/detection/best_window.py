@@ -33,7 +33,7 @@ _HEARD, _SURE, _NEXT_TO_NOTHING = 0.15, 3.0, 0.005
 """Part of the signal that is no noise; standard errors; C w over the stiffness of the tool."""
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
     """Whether anything may be cut: only where nothing is for sure, the state is idle.
 
@@ -60,7 +60,7 @@ def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
     return bool(heard and not most < _NEXT_TO_NOTHING * settings.tool_stiffness)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
     """Which of `estimate.STATES`, by its number."""
     now = state.now[0]
@@ -77,7 +77,7 @@ def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
     return STABLE
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def write_figures(
     state: DetectorState, windows: Records, wave: tuple[float, float, float], model: bool,
     amplitude: float,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ _FIT_AFTER, _FIT_HOPS = 100, 250
 """Hops until the means over turns have settled, and in a block of the fit of the machine."""
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _powers(products: Records, newest: int, windows: Records) -> None:
     """Without a model: the tool's power in each window."""
     for number in range(WINDOWS.size):
@@ -49,7 +50,7 @@ def _powers(products: Records, newest: int, windows: Records) -> None:
         windows[number].tool_power = power / count if count > 0.0 else np.nan
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _noise(
     products: Records, now: Any, settings: Any, kernels: Kernels, speed: float, noise: Any
 ) -> None:
@@ -63,7 +64,7 @@ def _noise(
     noise_sums(kernels.spill, tool * share, workpiece * share, thinned / speed, noise)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _follow_roots(now: Any, windows: Records, mechanics: Any, speed: float) -> None:
     """The rightmost roots of the cut as it is, and of a deeper one."""
     reference = windows[_REFERENCE]
@@ -111,12 +112,15 @@ def take_hops(
     model = settings.has_machine != 0 and settings.believed != 0
     count = block.shape[0] // hop
     turns = kernels.poles ** (hop // settings.thinning)
-    centres = np.angle(kernels.poles) * (settings.rate / settings.thinning)
+    centres = np.empty(kernels.poles.size)
+    for j in range(centres.size):
+        pole = kernels.poles[j]
+        centres[j] = math.atan2(pole.imag, pole.real) * (settings.rate / settings.thinning)
     lengths = WINDOWS.copy()
     while done < count:
         samples = block[done * hop : (done + 1) * hop]
         done += 1
-        between = now.holding in {1, 2} or now.ramping != 0 or now.alarmed != 0
+        between = 1 <= now.holding <= 2 or now.ramping != 0 or now.alarmed != 0
         take_hop(memory.fit, not between and now.hops_seen > _FIT_AFTER)
         newest = (now.newest + 1) % HOPS
         now.newest = newest

@@ -58,7 +58,7 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f'{name} {_CAUSES[cause - 1]}' for name, cause in found if name and cause)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _meets_rail(channel: Any, value: float) -> bool:
     """Whether a value that has come some times in a row is a rail met once more."""
     rounding = _ROUNDING * max(abs(channel.high), abs(channel.low))
@@ -74,7 +74,7 @@ def _meets_rail(channel: Any, value: float) -> bool:
     return False
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _causes(channels: Records, time: float) -> int:
     """What is wrong now, as `watch_channels` returns it."""
     causes = 0

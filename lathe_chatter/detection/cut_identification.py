@@ -75,7 +75,7 @@ def mechanics_of(machine: Machine, low: float, high: float) -> Records:
     )
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def forget(fit: Any) -> None:
     """Nothing known."""
     fit.cutting = fit.cutting_error = fit.stiffness = fit.stiffness_error = np.nan
@@ -83,7 +83,7 @@ def forget(fit: Any) -> None:
     fit.tool_power = fit.outputs = np.nan
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def characteristic(
     mechanics: Any, cutting: float, stiffness: float, delay: float, s: complex
 ) -> tuple[complex, complex, complex, complex]:
@@ -100,7 +100,7 @@ def characteristic(
     return value, slope, (1.0 - echo) * both, tool + cutting * (1.0 - echo)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def root_near(
     mechanics: Any, cutting: float, stiffness: float, delay: float, guess: complex
 ) -> complex:
@@ -120,7 +120,7 @@ def root_near(
     return complex(np.nan, np.nan)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def rightmost_in_band(
     mechanics: Any, cutting: float, stiffness: float, delay: float, guess: complex
 ) -> complex:
@@ -163,7 +163,7 @@ def cutting_limit(
     return low
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _at(row: Array, lag: float) -> float:
     """A correlation at a lag between samples."""
     middle = row.size // 2
@@ -175,7 +175,7 @@ def _at(row: Array, lag: float) -> float:
     return value
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: Any) -> None:
     """What white noise of the thinned samples adds to the sums of one output.
 
@@ -196,7 +196,7 @@ def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: 
     noise.pull_workpiece = -workpiece * change
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _fit(
     cross: float, square: float, target: float, noise_cross: float, noise_square: float,
     count: float, usual: float,
@@ -224,7 +224,7 @@ def _fit(
     return slope, error, clear / square
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def identify(
     products: Records, newest: int, lengths: Integers, mechanics: Any, noise: Any,
     delay: float, now: Any, total: Any, windows: Records,

@@ -81,7 +81,7 @@ _QUIET, _RECENT, _LASTING = 0.12, 3, 32
 in which it must be so; hops that a peak must last."""
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _surely_stable(windows: Records, first: int, end: int) -> bool:
     """Whether one of some windows says that the cut is stable."""
     for number in range(first, end):
@@ -91,7 +91,7 @@ def _surely_stable(windows: Records, first: int, end: int) -> bool:
     return False
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _grows(windows: Records) -> bool:
     """Whether a window says so, more likely than not."""
     for number in range(windows.size):
@@ -100,7 +100,7 @@ def _grows(windows: Records) -> bool:
     return False
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _score(state: DetectorState, windows: Records, model: bool, forced: bool) -> float:
     """1 is an alarm."""
     now = state.now[0]
@@ -151,7 +151,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
     return score
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _saturated(
     state: DetectorState, products: Records, newest: int, strongest: int, stiff: float
 ) -> bool:
@@ -179,7 +179,7 @@ def _saturated(
     return spread < _STEADY * total
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: float) -> None:
     """Raise the alarm, or clear it."""
     now = state.now[0]
@@ -207,7 +207,7 @@ def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: 
         restart_baseline(state)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def judge(
     state: DetectorState, settings: Any, products: Records, identified: Records, plain: Records,
     phases: Array, poles: Complex, centres: Array, speed: float,

@@ -60,6 +60,7 @@ class FitSums(NamedTuple):
         square: Instruments by instruments (2, 9, 9).
         cross: Instruments by F, x', x and h (2, 9, 4).
         fitted: F, x', x and h by themselves (2, 4, 4).
+        instruments: Room for those of an output (9,).
     """
 
     past: Complex
@@ -68,6 +69,7 @@ class FitSums(NamedTuple):
     square: Complex
     cross: Complex
     fitted: Complex
+    instruments: Complex
 
 
 def new_sums(kernels: Kernels, stride: int) -> FitSums:
@@ -80,6 +82,7 @@ def new_sums(kernels: Kernels, stride: int) -> FitSums:
         np.zeros((2, INSTRUMENTS, INSTRUMENTS), complex),
         np.zeros((2, INSTRUMENTS, _FITTED), complex),
         np.zeros((2, _FITTED, _FITTED), complex),
+        np.zeros(INSTRUMENTS, complex),
     )
 
 
@@ -89,7 +92,7 @@ def clear_sums(sums: FitSums) -> None:
         array[0] = 0
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def take_hop(sums: FitSums, counts: bool) -> None:
     """Take the newest hop into the block, or forget it."""
     if counts:
@@ -104,7 +107,7 @@ def take_hop(sums: FitSums, counts: bool) -> None:
                 kept[1, i, j] = 0.0
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def add_output(
     sums: FitSums, force: complex, slope: complex, place: complex, workpiece: complex,
     chip: complex,
@@ -117,11 +120,11 @@ def add_output(
     if sums.counts[2] < size:
         return
     sums.counts[1] += 1
-    instruments = np.empty(INSTRUMENTS, np.complex128)
+    instruments = sums.instruments
     for i in range(3):
         for j in range(3):
             instruments[3 * i + j] = sums.past[(newest - sums.lags[i]) % size, j].conjugate()
-    fitted = np.array([force, slope, place, chip])
+    fitted = (force, slope, place, chip)
     for i in range(INSTRUMENTS):
         for j in range(i + 1):
             sums.square[1, i, j] += instruments[i] * instruments[j].conjugate()

@@ -88,7 +88,7 @@ def new_memory(turn: float, kernels: Kernels, stride: int) -> Memory:
     )
 
 
-@compiled(inline=True, inner=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _interpolated(row: Array, index: int, x: float) -> float:
     """The polynomial through six values, a fraction x beyond `index`."""
     a, b, c, d, e, f = x + 2.0, x + 1.0, x, x - 1.0, x - 2.0, x - 3.0
@@ -103,7 +103,7 @@ def _interpolated(row: Array, index: int, x: float) -> float:
     return result
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _make_room(history: Array, counts: Any) -> None:
     """Forget the older half."""
     keep = history.shape[1] // 2
@@ -117,7 +117,7 @@ def _make_room(history: Array, counts: Any) -> None:
     counts.free_from = max(counts.free_from - shift, 0)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     """Fill in the changes over a turn of the newest thinned sample; whether there are any."""
     n = counts.filled - 1
@@ -153,7 +153,7 @@ def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     return True
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _take_phase(history: Array, n: int, phases: Array) -> None:
     """Note the relative motion where the spindle passes one of a few fixed angles."""
     now, before = PHASES * history[ANGLE, n], PHASES * history[ANGLE, n - 1]
@@ -174,7 +174,7 @@ def _take_phase(history: Array, n: int, phases: Array) -> None:
     phases[PHASE_SEEN, place] = seen + 1.0
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _take_products(
     history: Array, first: int, kernels: Kernels, settings: Any, products: Any, fit: FitSums
 ) -> None:
@@ -204,7 +204,7 @@ def _take_products(
     add_output(fit, force, slope, free, place, chip)
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def clear(sums: Any) -> None:
     """All 0."""
     sums.force_force = sums.force_chip = sums.chip_chip = 0.0
@@ -213,7 +213,7 @@ def clear(sums: Any) -> None:
     sums.tool_noise = sums.workpiece_noise = 0.0
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def add(total: Any, hop: Any) -> None:
     """Add what the fits need of a hop."""
     total.force_force += hop.force_force
@@ -226,7 +226,7 @@ def add(total: Any, hop: Any) -> None:
     total.outputs += hop.outputs
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def _noise_of(block: Array, column: int) -> float:
     """Variance of the noise of single samples, from their third differences."""
     total = 0.0
@@ -237,7 +237,7 @@ def _noise_of(block: Array, column: int) -> float:
     return float(total / (20.0 * (block.shape[0] - 3)))
 
 
-@compiled(inner=True)
+@compiled(borrows=True, inner=True)
 def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, products: Any) -> None:
     """Take in one hop of samples.
 

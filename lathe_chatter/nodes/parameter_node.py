@@ -46,6 +46,9 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         # read, checked by the table, and declared again as the table has them.
         self.requests = RequestLoad()
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
+        if hasattr(self.context, 'untrack_node'):
+            # From Kilted on a context ends its nodes, one too whose making was given up half-way.
+            self.context.untrack_node(self)
         self._table = table
         self._values = table.complete(self._take_overrides())
         for row in table:

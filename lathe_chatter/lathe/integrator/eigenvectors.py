@@ -40,29 +40,40 @@ class Basis(NamedTuple):
     rate: float
 
 
-@compiled()
 def product(a: Array, b: Array) -> Array:
     """The matrix product, summed in order."""
     result = np.zeros((a.shape[0], b.shape[1]))
+    _add_product(np.ascontiguousarray(a), np.ascontiguousarray(b), result)
+    return result
+
+
+@compiled(borrows=True)
+def _add_product(a: Array, b: Array, result: Array) -> None:
+    """Add the matrix product to `result`."""
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
             for j in range(b.shape[1]):
                 result[i, j] += a[i, k] * b[k, j]
-    return result
 
 
-@compiled()
 def inverse_of(matrix: Array) -> tuple[Array, bool]:
-    """The inverse by Gauss and Jordan with pivots, and whether there is one."""
-    n = matrix.shape[0]
-    a, result = matrix.copy(), np.eye(n)
+    """The inverse, and whether there is one."""
+    result = np.eye(len(matrix))
+    regular = _invert(np.array(matrix, order='C'), result)
+    return result, regular
+
+
+@compiled(borrows=True)
+def _invert(a: Array, result: Array) -> bool:
+    """Gauss and Jordan with pivots: `a` becomes the unit matrix, which `result` is before."""
+    n = a.shape[0]
     for column in range(n):
         pivot = column
         for row in range(column + 1, n):
             if abs(a[row, column]) > abs(a[pivot, column]):
                 pivot = row
         if not abs(a[pivot, column]) > 0.0:
-            return result, False
+            return False
         for k in range(n):
             a[column, k], a[pivot, k] = a[pivot, k], a[column, k]
             result[column, k], result[pivot, k] = result[pivot, k], result[column, k]
@@ -76,10 +87,10 @@ def inverse_of(matrix: Array) -> tuple[Array, bool]:
                 for k in range(n):
                     a[row, k] -= factor * a[column, k]
                     result[row, k] -= factor * result[column, k]
-    return result, True
+    return True
 
 
-@compiled()
+@compiled(borrows=True, inner=True)
 def _rotate(t: Any, q: Any, i: int, j: int, c: float, s: complex) -> None:
     """T -> G T G*, Q -> Q G* for the rotation that mixes rows i and j."""
     n = t.shape[0]
@@ -93,7 +104,7 @@ def _rotate(t: Any, q: Any, i: int, j: int, c: float, s: complex) -> None:
         q[k, i], q[k, j] = c * x + s.conjugate() * y, c * y - s * x
 
 
-@compiled()
+@compiled(borrows=True, inner=True)
 def _rotation(x: complex, y: complex) -> tuple[float, complex]:
     """c and s of the rotation that takes (x, y) to (r, 0)."""
     size_x, size_y = abs(x), abs(y)
@@ -105,18 +116,16 @@ def _rotation(x: complex, y: complex) -> tuple[float, complex]:
     return size_x / length, (x / size_x) * y.conjugate() / length
 
 
-@compiled()
-def _schur(matrix: Array) -> tuple[Any, Any, bool]:
-    """T and Q of A = Q T Q*, T upper triangular; and whether it has converged."""
-    n = matrix.shape[0]
-    t, q = matrix.astype(np.complex128), np.eye(n).astype(np.complex128)
+@compiled(borrows=True, inner=True)
+def _schur(t: Any, q: Any, cosines: Array, sines: Any) -> bool:
+    """Make T and Q of A = Q T Q*, T upper triangular, of A and 1; whether it has converged."""
+    n = t.shape[0]
     for k in range(n - 2):
         for i in range(k + 2, n):
             if t[i, k] != 0.0:
                 c, s = _rotation(t[k + 1, k], t[i, k])
                 _rotate(t, q, k + 1, i, c, s)
                 t[i, k] = 0.0
-    cosines, sines = np.empty(n), np.empty(n, dtype=np.complex128)
     high, steps = n - 1, 0
     while high > 0:
         low = high
@@ -131,7 +140,7 @@ def _schur(matrix: Array) -> tuple[Any, Any, bool]:
             continue
         steps += 1
         if steps > _MOST_STEPS:
-            return t, q, False
+            return False
         a, b = t[high - 1, high - 1], t[high - 1, high]
         c2, d = t[high, high - 1], t[high, high]
         half = 0.5 * (a - d)
@@ -159,16 +168,22 @@ def _schur(matrix: Array) -> tuple[Any, Any, bool]:
                 q[i, k], q[i, k + 1] = c * x + s.conjugate() * y, c * y - s * x
         for k in range(n):
             t[k, k] += shift
-    return t, q, True
+    return True
 
 
-@compiled()
 def eigenvectors(matrix: Array) -> tuple[Any, Any, bool]:
     """Eigenvalues (n,) and eigenvectors (n, n) of a real matrix, and whether they were found."""
-    n = matrix.shape[0]
-    t, q, found = _schur(matrix)
-    values, vectors = np.empty(n, dtype=np.complex128), np.empty((n, n), dtype=np.complex128)
-    x = np.empty(n, dtype=np.complex128)
+    n = len(matrix)
+    values, vectors, room = np.empty(n, complex), np.empty((n, n), complex), np.empty(n, complex)
+    t, q = matrix.astype(complex, order='C'), np.eye(n, dtype=complex)
+    return values, vectors, _find(t, q, values, vectors, np.empty(n), room)
+
+
+@compiled(borrows=True)
+def _find(t: Any, q: Any, values: Any, vectors: Any, cosines: Array, x: Any) -> bool:
+    """Write eigenvalues and eigenvectors of the matrix `t`; whether they were found."""
+    n = t.shape[0]
+    found = _schur(t, q, cosines, x)
     size = 0.0
     for k in range(n):
         values[k] = t[k, k]
@@ -188,7 +203,7 @@ def eigenvectors(matrix: Array) -> tuple[Any, Any, bool]:
             for j in range(k + 1):
                 total += q[i, j] * x[j]
             vectors[i, k] = total
-    return values, vectors, found
+    return found
 
 
 def basis_of(matrix: Array, scale: Array) -> Basis:

@@ -43,7 +43,7 @@ _MOST_FLIPS = 32
 rounding cannot decide is no reason to stand still."""
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _leave_surface(
     counts: Integers, nodes: Array, settings: Array, bend: float, scratch: Scratch
 ) -> None:
@@ -67,7 +67,7 @@ def _leave_surface(
     )
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _move_on(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, slope: float, node: int,
     at_node: bool, ramp_ends: bool, scratch: Scratch,
@@ -102,7 +102,7 @@ def _move_on(
     counts[layout.POINTER] = node
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def take_step(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
     on_tool: float, between: float, events: Array, found: int, scratch: Scratch,

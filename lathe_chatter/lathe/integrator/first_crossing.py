@@ -12,7 +12,7 @@ _ITERATIONS = 60
 _CLOSE = 1e-15
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def may_turn_back(
     start: float, slope: float, end: float, slope_end: float, duration: float
 ) -> bool:
@@ -25,7 +25,7 @@ def may_turn_back(
     return (end < 0.0) | turns
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _lowest(margin: Array, last: int) -> tuple[float, float]:
     """Where a margin that falls first and then rises is lowest, or some place where it is < 0."""
     low, high, place, value = 0.0, 1.0, 0.5, 0.0
@@ -41,7 +41,7 @@ def _lowest(margin: Array, last: int) -> tuple[float, float]:
     return place, value
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _highest(margin: Array, last: int) -> float:
     """Where a margin that rises first and then falls is highest."""
     low, high = 0.0, 1.0
@@ -56,7 +56,7 @@ def _highest(margin: Array, last: int) -> float:
     return low
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _guess(start: float, slope: float, end: float, slope_end: float) -> float:
     """A zero in [0, 1] of the cubic through both ends, by a few steps of Newton's method."""
     a2 = 3.0 * (end - start) - 2.0 * slope - slope_end
@@ -71,7 +71,7 @@ def _guess(start: float, slope: float, end: float, slope_end: float) -> float:
     return place
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def first_crossing(margin: Array, last: int, end: float, slope_end: float) -> float:
     """Where a margin, which should stay positive, first falls below zero.
 

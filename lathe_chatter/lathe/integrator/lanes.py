@@ -20,13 +20,12 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from lathe_chatter.lathe.integrator import lanes_in_python as plain
 
 LANES = plain.LANES
 _DOUBLE, _INT = ir.DoubleType(), ir.IntType(64)
-_OPTIONS = {'forceinline': True, '_nrt': False, 'error_model': 'numpy'}
 _UNALIGNED = 8
 
 
@@ -258,72 +257,81 @@ def _turned_on(
     return types.UniTuple(_NUMBERS, 2)(*numbers), emit
 
 
-def _between(emit: Callable[[Any, Any, Any], Any], result: Any) -> Any:
-    """An intrinsic of two lanes, or of lanes and a number."""
+def _choice(sign: str) -> Any:
+    """The one of two that compares so to the other: of two lanes, or of lanes and a number."""
 
     @intrinsic  # type: ignore[untyped-decorator]  # Numba
     def code(_typing: Any, a: Any, b: Any) -> Any:
         kinds = [kind if isinstance(kind, _Vector) else types.float64 for kind in (a, b)]
 
-        def generate(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return emit(builder, *_lanes_of(builder, signature, values))
+        def emit(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            one, other = _lanes_of(builder, signature, values)
+            return builder.select(builder.fcmp_ordered(sign, one, other), one, other)
 
-        return result(*kinds), generate
+        return _NUMBERS(*kinds), emit
 
     return code
 
 
-def _compared(sign: str) -> Any:
-    return _between(lambda builder, a, b: builder.fcmp_ordered(sign, a, b), _MASK)
-
-
-def _chosen(sign: str) -> Any:
-    """The one of two that compares so to the other."""
-    return _between(
-        lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, a, b), a, b), _NUMBERS
-    )
-
-
 _OPERATORS = {
-    operator.add: _between(lambda builder, a, b: builder.fadd(a, b), _NUMBERS),
-    operator.sub: _between(lambda builder, a, b: builder.fsub(a, b), _NUMBERS),
-    operator.mul: _between(lambda builder, a, b: builder.fmul(a, b), _NUMBERS),
-    operator.truediv: _between(lambda builder, a, b: builder.fdiv(a, b), _NUMBERS),
-    operator.lt: _compared('<'),
-    operator.gt: _compared('>'),
-    operator.le: _compared('<='),
-    operator.eq: _compared('=='),
-    operator.and_: _between(lambda builder, a, b: builder.and_(a, b), _MASK),
-    operator.or_: _between(lambda builder, a, b: builder.or_(a, b), _MASK),
+    operator.add: (lambda builder, a, b: builder.fadd(a, b), _NUMBERS),
+    operator.sub: (lambda builder, a, b: builder.fsub(a, b), _NUMBERS),
+    operator.mul: (lambda builder, a, b: builder.fmul(a, b), _NUMBERS),
+    operator.truediv: (lambda builder, a, b: builder.fdiv(a, b), _NUMBERS),
+    operator.lt: (lambda builder, a, b: builder.fcmp_ordered('<', a, b), _MASK),
+    operator.gt: (lambda builder, a, b: builder.fcmp_ordered('>', a, b), _MASK),
+    operator.le: (lambda builder, a, b: builder.fcmp_ordered('<=', a, b), _MASK),
+    operator.eq: (lambda builder, a, b: builder.fcmp_ordered('==', a, b), _MASK),
+    operator.and_: (lambda builder, a, b: builder.and_(a, b), _MASK),
+    operator.or_: (lambda builder, a, b: builder.or_(a, b), _MASK),
 }
 
 
-def _overloaded(function: Any, code: Any) -> None:
-    @overload(function, jit_options=_OPTIONS)  # type: ignore[untyped-decorator]  # Numba
-    def _of_lanes(a: Any, b: Any) -> Any:
-        def of_either(a: Any, b: Any) -> Any:
-            return code(a, b)
+def _give_operator(function: Any, emit: Callable[[Any, Any, Any], Any], result: Any) -> None:
+    """Let an operator take two lanes, or lanes and a number; as `overload`, at no compilation."""
 
-        return of_either if isinstance(a, _Vector) or isinstance(b, _Vector) else None
+    @type_callable(function)  # type: ignore[untyped-decorator]  # Numba
+    def _typed(_context: Any) -> Any:
+        def kind(a: Any, b: Any) -> Any:
+            return result if isinstance(a, _Vector) or isinstance(b, _Vector) else None
+
+        return kind
+
+    def lowered(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        given = [
+            value
+            if isinstance(kind, _Vector)
+            else context.cast(builder, value, kind, types.float64)
+            for kind, value in zip(signature.args, values, strict=True)
+        ]
+        return emit(builder, *_lanes_of(builder, signature, given))
+
+    for kinds in ((_Vector, _Vector), (_Vector, types.Number), (types.Number, _Vector)):
+        lower_builtin(function, *kinds)(lowered)
 
 
-for _operator, _code in _OPERATORS.items():
-    _overloaded(_operator, _code)
+for _operator, (_emit, _result) in _OPERATORS.items():
+    _give_operator(_operator, _emit, _result)
 
 
-@overload(operator.neg, jit_options=_OPTIONS)  # type: ignore[untyped-decorator]  # Numba
-def _negative(a: Any) -> Any:
-    def of_each(a: Any) -> Any:
-        return a * -1.0
+@type_callable(operator.neg)  # type: ignore[untyped-decorator]  # Numba
+def _negative(_context: Any) -> Any:
+    def kind(a: Any) -> Any:
+        return a if a is _NUMBERS else None
 
-    return of_each if a is _NUMBERS else None
+    return kind
+
+
+@lower_builtin(operator.neg, _Vector)  # type: ignore[untyped-decorator]  # Numba
+def _negated(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+    return builder.fmul(values[0], _constant([-1.0] * LANES))
 
 
 lanes_at, put, put_samples = _load, _store, _store_samples
 spread, counted, after, before, lane = _spread, _counted, _after, _before, _lane
 fma, first_of, turned_on = _fused, _first_of, _turned_on
 total, powers = _total, _powers
-smaller, larger = _chosen('<'), _chosen('>')
+smaller, larger = _choice('<'), _choice('>')
 if numba.config.DISABLE_JIT:
     lanes_at, put, put_samples = plain.lanes_at, plain.put, plain.put_samples
     spread, counted, after = plain.spread, plain.counted, plain.after

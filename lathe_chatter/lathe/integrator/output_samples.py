@@ -14,7 +14,7 @@ COLUMNS = 8
 """Without accelerations, of which there are two more."""
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def write_sample(
     out: Array, row: int, time: float, angle: float, present: Array, per_step: float, chip: float,
     force: float,
@@ -26,7 +26,7 @@ def write_sample(
     out[row, 6], out[row, 7] = chip, force
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def add_runout(out: Array, row: int, settings: Array, speed: float) -> None:
     """Add to a sample what the sensors see of bodies that are not round; speed in rev/s."""
     sine, cosine = sine_and_cosine(out[row, 1])
@@ -37,7 +37,7 @@ def add_runout(out: Array, row: int, settings: Array, speed: float) -> None:
     out[row, 5] -= settings[layout.RUNOUT] * swing
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def write_accelerations(
     out: Array, row: int, z: Array, rules: Array, direct: Array, met: float, on_tool: float,
     between: float, turning: float,
@@ -51,7 +51,7 @@ def write_accelerations(
         out[row, COLUMNS + k] = total
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def add_sensor_noise(out: Array, rows: int, counts: Integers, settings: Array) -> None:
     """Add to the samples of a call the noise of their sensors."""
     first, seed = counts[layout.SAMPLES] - rows + 1, int(settings[layout.SEED])

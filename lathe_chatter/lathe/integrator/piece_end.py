@@ -25,7 +25,7 @@ DETAIL = 1.5
 ) = range(14)  # fmt: skip
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def by_time(
     slope: float, curvature: float, lead: float, speed: float, acceleration: float
 ) -> tuple[float, float]:
@@ -36,7 +36,7 @@ def by_time(
     )
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def plan_piece(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, base: float, slope: float,
     limit: float, piece: Array,

@@ -42,7 +42,7 @@ from lathe_chatter.lathe.integrator.surface_met import look_up, nodes_on_grid, s
 from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 
 
-@compiled(inline=True, borrows=True, apart=True)
+@compiled(inline=True, borrows=True, apart=True, inner=True)
 def take_plain_steps(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, rules: Array,
     outputs: Array, direct: Array, step_matrix: Array, out: Array, row: int, block: Array,
@@ -353,7 +353,7 @@ def take_plain_steps(
     return row
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _at(ends: Any, k: int) -> Any:
     """What is so at the end of step `k` of a block."""
     return (
@@ -363,19 +363,19 @@ def _at(ends: Any, k: int) -> Any:
     )  # fmt: skip
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _counted_on(samples: int, step: int, taken: int, steps: int) -> tuple[int, int]:
     """Samples, and steps of the one under way, after more steps."""
     return samples + (step + taken) // steps, (step + taken) % steps
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _rest(outputs: Array, what: int) -> Any:
     """What the rest of the regime means."""
     return spread(outputs[outputs.shape[0] - 1, what])
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _answer(
     rules: Array, first: int, i: int, u0: Any, d0: Any, e0: Any, u1: Any, d1: Any, e1: Any
 ) -> Any:
@@ -385,7 +385,7 @@ def _answer(
     return start + end
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _turn_coupled(step_matrix: Array, z: Array, moved: Array) -> None:
     """Take the steps of a block whose coordinates are all coupled: pushes in, coordinates out."""
     for k in range(LANES):

@@ -50,7 +50,7 @@ class Scratch(NamedTuple):
     moved: Array  # the coordinates in it (2n, LANES)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def solve_series(
     z: Array, regime: int, machine: Machine, scratch: Scratch, f0: float, g0: float, h0: float,
     f1: float, g1: float, h1: float,
@@ -74,7 +74,7 @@ def solve_series(
     )  # fmt: skip
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def first_event(
     numbers: Array, regime: int, outputs: Array, settings: Array, scratch: Scratch, wide: bool
 ) -> tuple[float, int]:
@@ -122,7 +122,7 @@ def first_event(
     return (place, event) if place <= 1.0 else (NEVER, NOTHING)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _margin(
     start: float, side: float, of_chip: bool, outputs: Array, scratch: Scratch, wide: bool
 ) -> int:
@@ -144,7 +144,7 @@ def _margin(
     return TERMS if wide else LANES
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def kind_of(event: int, regime: int) -> tuple[int, int]:
     """The kind of an event as it is told, and the regime after it."""
     if event == CHIP:

@@ -57,7 +57,7 @@ WEIGHTS = np.array([[1.0 / math.factorial(k + 1) for k in range(TERMS)]])
 """Of the terms at the end of a piece."""
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def quintic(
     u0: float, d0: float, e0: float, u1: float, d1: float, e1: float, out: Array, row: int
 ) -> None:
@@ -71,7 +71,7 @@ def quintic(
     out[row, 5] = 120.0 * (6.0 * rise - 3.0 * steep + 0.5 * bend)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def solve_piece(
     z: Array, duration: float, rules: Array, generator: Array, direct: Array, forces: Array,
     given: Array, series: Array, work: Array, end: Array,
@@ -139,7 +139,7 @@ def solve_piece(
     return wide  # type: ignore[no-any-return]  # a bool
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _solve_coupled(
     z: Array, duration: float, rules: Array, generator: Array, coupled: bool, forces: Array,
     series: Array, work: Array,
@@ -175,7 +175,7 @@ def _solve_coupled(
             series[i, k] = term[i] = following[i]
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def coordinates_at(z: Array, series: Array, wide: bool, place: float, there: Array) -> None:
     """Write the coordinates (2n,) at `place` of a solved piece that began with `z`."""
     low = powers(place)
@@ -188,7 +188,7 @@ def coordinates_at(z: Array, series: Array, wide: bool, place: float, there: Arr
         there[i] = z[i] + total(terms)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def read_outputs(outputs: Array, z: Array, out: Array) -> None:
     """What the coordinates mean (1, OUTPUTS), by the outputs (2n + 1, OUTPUTS) of the regime."""
     seen = lanes_at(outputs, z.shape[0], 0)
@@ -197,7 +197,7 @@ def read_outputs(outputs: Array, z: Array, out: Array) -> None:
     put(out, 0, 0, seen)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def value_and_slope(series: Array, last: int, place: float) -> tuple[float, float]:
     """A power series up to term `last`, and its derivative, at `place`."""
     value, slope = series[last], 0.0

@@ -46,7 +46,7 @@ def _layers() -> tuple[Array, Array]:
 _EDGES, _INSIDE = _layers()
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _mixed(word: np.uint64) -> np.uint64:
     """The finaliser of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014)."""
     word = (word ^ (word >> _S30)) * _MIX_1
@@ -54,19 +54,19 @@ def _mixed(word: np.uint64) -> np.uint64:
     return word ^ (word >> _S31)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def stream_key(seed: int, stream: int) -> np.uint64:
     """Where the numbers of a stream begin."""
     return _mixed(np.uint64(seed) * _GOLDEN + np.uint64(stream))
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _uniform(word: np.uint64) -> float:
     """In (0, 1), from the upper bits of a word."""
     return (np.float64(word >> _S11) + 0.5) * 2.0**-53
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _unlikely(word: np.uint64) -> float:
     """What one word in a hundred needs: the edge of a layer, or the tail."""
     while True:
@@ -90,7 +90,7 @@ def _unlikely(word: np.uint64) -> float:
         word = _mixed(word + _GOLDEN)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def normal(key: np.uint64, counter: int) -> float:
     """A standard normal number by Marsaglia and Tsang's ziggurat from one hashed word."""
     word = _mixed(key + np.uint64(counter) * _GOLDEN)

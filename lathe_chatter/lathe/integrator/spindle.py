@@ -21,7 +21,7 @@ _S1, _S2, _S3, _S4, _S5, _S6, _S7 = (1.0 / math.factorial(2 * k + 1) for k in ra
 _C2, _C3, _C4, _C5, _C6, _C7, _C8 = (1.0 / math.factorial(2 * k) for k in range(2, 9))
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def sine_and_cosine(turns: float) -> tuple[float, float]:
     """Of an angle in turns: by their series about the next quarter turn, to rounding.
 
@@ -44,7 +44,7 @@ def sine_and_cosine(turns: float) -> tuple[float, float]:
     return -sine, -cosine
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def speed_and_slope(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> tuple[float, float]:
@@ -55,7 +55,7 @@ def speed_and_slope(
     return base * factor, slope * factor + base * swing
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def turned(
     time: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
@@ -87,7 +87,7 @@ def turned(
     return even + amplitude * swing
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def time_to_turn(
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
@@ -105,7 +105,7 @@ def time_to_turn(
     return time
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def speed_curvature(
     base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:

@@ -38,22 +38,18 @@ _NONE = np.zeros(1, dtype=np.int64)
 
 def room_for(modes: int) -> Array:
     """Room for a call of `advance`; it must be left as it is between calls."""
-    width = _whole_lines(2 * modes)
+    width = (2 * modes + _LINE - 1) // _LINE * _LINE
     return surface.aligned(_SMALL + 2 * width + width * (TERMS + LANES) + 3 * (width + TERMS))
 
 
 _BLOCK = 16 + 16 + 8 + 24 + 2 * TERMS
 _SMALL = _BLOCK + at.ROWS * LANES
 """Numbers that are needed whatever the number of modes."""
+_LINE = 8
+"""Numbers in a line of the processor's cache."""
 
 
-@compiled(inline=True, borrows=True)
-def _whole_lines(count: int) -> int:
-    """So many numbers and more, to the end of a line of the processor's cache."""
-    return (count + 7) // 8 * 8
-
-
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _move_origin(numbers: Array, counts: Integers, nodes: Array, settings: Array) -> None:
     """Count places from a later origin, before they become large or where they left the grid."""
     place, shift = numbers[layout.PLACE], 0.0
@@ -75,7 +71,7 @@ def _move_origin(numbers: Array, counts: Integers, nodes: Array, settings: Array
     numbers[layout.ORIGIN] = total
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _take_any_step(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
     out: Array, row: int, events: Array, found: int, scratch: Scratch,
@@ -141,7 +137,7 @@ def _take_any_step(
     return 1, found, layout.FINISHED
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def _cut_on(
     numbers: Array, z: Array, counts: Integers, nodes: Array, settings: Array, machine: Machine,
     out: Array, events: Array, scratch: Scratch,
@@ -213,7 +209,7 @@ def advance(
     moves = flat[first:last].reshape((regimes, regimes, n2 + 1, n2))
     matrices = flat[last:].reshape((regimes, 2, n2, n2))
     machine = Machine(rules, outputs, direct, moves, matrices)
-    width = _whole_lines(n2)
+    width = (n2 + _LINE - 1) // _LINE * _LINE
     series = _SMALL + 2 * width
     moved = series + n2 * TERMS
     work = moved + n2 * LANES

@@ -78,7 +78,7 @@ def fresh_surface(offset: float, turn: float, capacity: int) -> Array:
     return nodes
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def quintic_at(
     place0: float, height0: float, slope0: float, curvature0: float,
     place1: float, height1: float, slope1: float, curvature1: float, at: float,
@@ -101,7 +101,7 @@ def quintic_at(
     return height, slope * per_width, curvature * (per_width * per_width)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def surface_at(nodes: Array, left: int, at: float) -> tuple[float, float, float]:
     """S and its first two derivatives at place `at` between nodes `left` and `left + 1`."""
     right = left + 1
@@ -113,7 +113,7 @@ def surface_at(nodes: Array, left: int, at: float) -> tuple[float, float, float]
     )  # fmt: skip
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def write_node(
     nodes: Array, node: int, place: float, height: float, slope: float, curvature: float,
     pitch: float,
@@ -127,7 +127,7 @@ def write_node(
     nodes[PITCH, node] = pitch
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def forget(nodes: Array, first: int, last: int, shift: float) -> None:
     """Forget what lies before node `first`, and count places from an origin `shift` further on.
 

@@ -14,13 +14,13 @@ from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.lathe.integrator.lanes import fma
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def lower(order: int, other: int) -> int:
     """The lower of two orders of a corner, where 0 stands for none."""
     return max(order, other) if order == 0 or other == 0 else min(order, other)
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def by_place(
     rate: float, bend: float, lead: float, speed: float, acceleration: float
 ) -> tuple[float, float]:
@@ -37,7 +37,7 @@ def by_place(
     return slope, (bend - (lead + slope) * acceleration) / (speed * speed)
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def bend_of(
     z: Array, outputs: Array, direct: Array, met: float, on_tool: float, between: float,
     turning: float,
@@ -51,7 +51,7 @@ def bend_of(
     return bend + forced  # type: ignore[no-any-return]  # a float
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def finish_corner(
     numbers: Array, counts: Integers, nodes: Array, settings: Array, bend: float,
     speed: float, acceleration: float,

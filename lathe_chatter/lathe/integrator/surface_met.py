@@ -20,7 +20,7 @@ from lathe_chatter.lathe.integrator.piece_end import DETAIL
 from lathe_chatter.lathe.integrator.spindle import sine_and_cosine, speed_and_slope
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def nodes_on_grid(nodes: Array, first: int, place: float, turn: float) -> int:
     """Of the steps that end at `place` and one, two ... further on, how many meet smooth nodes.
 
@@ -39,7 +39,7 @@ def nodes_on_grid(nodes: Array, first: int, place: float, turn: float) -> int:
     return first_of(off)  # type: ignore[no-any-return]  # Numba has no types
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def surface_on_grid(nodes: Array, first: int, settings: Array) -> tuple[Any, Any, Any, Any]:
     """Height, slope, curvature before and after of such steps, by place."""
     height = lanes_at(nodes, surface.HEIGHT, first)
@@ -62,14 +62,14 @@ def surface_on_grid(nodes: Array, first: int, settings: Array) -> tuple[Any, Any
     return height, slope, curvature, curvature
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def _weighed(settings: Array, w: int, rising: Any, d0: Any, d1: Any, e0: Any, e1: Any) -> Any:
     """The sum of what two nodes tell, by five weights."""
     curved = fma(settings[w + 3], e0, settings[w + 4] * e1)
     return fma(settings[w], rising, fma(settings[w + 1], d0, fma(settings[w + 2], d1, curved)))
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def look_up(
     nodes: Array, settings: Array, pointer: int, place: float, ahead: float, phase: float,
     speed: float, most: int, block: Array,

@@ -10,14 +10,14 @@ from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.spindle import sine_and_cosine
 
 
-@compiled(inline=True, borrows=True)
+@compiled(inline=True, borrows=True, inner=True)
 def angle_at(numbers: Array, settings: Array, place: float) -> float:
     """The spindle's angle at a place, rev since the start."""
     turned: float = numbers[layout.ORIGIN_LOW] + place * (1.0 / settings[layout.TURN])
     return numbers[layout.ORIGIN] + turned  # type: ignore[no-any-return]  # a float
 
 
-@compiled(borrows=True)
+@compiled(borrows=True, inner=True)
 def unbalance_force(
     settings: Array, angle: float, ratio: float, ratio_slope: float, ratio_curvature: float
 ) -> tuple[float, float, float]:

@@ -8,10 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial, polynomial
+from support.python_entry import with_entry
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.lathe.integrator.first_crossing import NEVER, first_crossing, may_turn_back
+from lathe_chatter.lathe.integrator import first_crossing as module
+from lathe_chatter.lathe.integrator.first_crossing import NEVER
 from lathe_chatter.lathe.integrator.propagation import TERMS
+
+first_crossing = with_entry(module.first_crossing)
+may_turn_back = with_entry(module.may_turn_back)
 
 
 def _crossing(series: Array, sign: float) -> float:

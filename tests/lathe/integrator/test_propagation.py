@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from scipy.linalg import expm
+from support.python_entry import with_entry
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import propagation
@@ -21,6 +22,10 @@ from lathe_chatter.lathe.integrator.coefficients import (
 from lathe_chatter.lathe.integrator.propagation import TERMS
 from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.model.machine_and_sampling import LatheSetup
+
+solve_piece, quintic = with_entry(propagation.solve_piece), with_entry(propagation.quintic)
+coordinates_at = with_entry(propagation.coordinates_at)
+value_and_slope = with_entry(propagation.value_and_slope)
 
 _SEVERAL = Machine(
     [Mode(0.4, 2000.0, 0.03, chip=0.8, force=-0.3), Mode(1.2, 1100.0, 0.02)],
@@ -72,7 +77,7 @@ def _solved(
     direct = np.zeros(layout.DIRECT)
     direct[layout.COUPLED], direct[layout.RATE] = float(not basis.in_pairs), basis.rate
     forces = np.array([_TOOL_FORCE, _BETWEEN, 1.0, 0.0, 0.0, 0.0])
-    wide = propagation.solve_piece(
+    wide = solve_piece(
         z, duration, constants.rules[regime], basis.generator, direct, forces, given, series,
         work, end,
     )  # fmt: skip
@@ -97,7 +102,7 @@ def test_a_piece_is_the_matrix_exponential(machine: Machine, regime: int, durati
     found = basis.vectors @ end + constants.rests[regime]
     assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
     middle = np.empty(2 * n)
-    propagation.coordinates_at(z, series, wide, 0.4, middle)
+    coordinates_at(z, series, wide, 0.4, middle)
     weights = np.array([1.0 / math.factorial(k + 1) for k in range(TERMS if wide else TERMS // 2)])
     by_series = [
         Polynomial(np.append(z[i], series[i, : len(weights)] * weights))(0.4) for i in range(2 * n)
@@ -114,8 +119,8 @@ def test_a_whole_step_is_the_piece_of_that_length(machine: Machine, regime: int)
     basis, rules = constants.bases[regime], constants.rules[regime]
     z = basis.inverse @ moved
     given = np.zeros((2, TERMS))
-    propagation.quintic(*ends, given, 0)
-    propagation.quintic(*turning, given, 1)
+    quintic(*ends, given, 0)
+    quintic(*turning, given, 1)
     end, _, _ = _solved(constants, regime, z, 1.0, given)
     found = expm(basis.generator) @ z
     found += ends @ rules[layout.STEP_SURFACE : layout.STEP_SURFACE + 6]
@@ -139,7 +144,7 @@ def test_only_nearly_equal_eigenvalues_stay_coupled() -> None:
 def test_the_quintic_has_the_given_values_slopes_and_curvatures() -> None:
     given = [0.3, -1.0, 2.0, 0.7, -1.3, 0.4]
     derivatives = np.zeros((1, 6))
-    propagation.quintic(*given, derivatives, 0)
+    quintic(*given, derivatives, 0)
     p = Polynomial([d / math.factorial(k) for k, d in enumerate(derivatives[0])])
     found = [q(place) for place in (0.0, 1.0) for q in (p, p.deriv(), p.deriv(2))]
     assert found == pytest.approx(given, rel=1e-14)
@@ -149,7 +154,7 @@ def test_the_quintic_has_the_given_values_slopes_and_curvatures() -> None:
 def test_the_weights_between_two_nodes_are_those_of_the_quintic(part: float) -> None:
     given = [0.3, -1.0, 2.0, 0.7, -1.3, 0.4]
     derivatives = np.zeros((1, 6))
-    propagation.quintic(*given, derivatives, 0)
+    quintic(*given, derivatives, 0)
     p = Polynomial([d / math.factorial(k) for k, d in enumerate(derivatives[0])])
     u0, d0, e0, u1, d1, e1 = given
     found = between_nodes(part) @ [u1 - u0, d0, d1, e0, e1]
@@ -159,5 +164,5 @@ def test_the_weights_between_two_nodes_are_those_of_the_quintic(part: float) -> 
 def test_a_series_with_its_slope() -> None:
     series = np.random.default_rng(3).normal(size=TERMS)
     p = Polynomial(series)
-    found = propagation.value_and_slope(series, TERMS - 1, 0.7)
+    found = value_and_slope(series, TERMS - 1, 0.7)
     assert found == pytest.approx((p(0.7), p.deriv()(0.7)), rel=1e-14)

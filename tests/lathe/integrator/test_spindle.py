@@ -7,13 +7,13 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from support.python_entry import with_entry
 
-from lathe_chatter.lathe.integrator.spindle import (
-    sine_and_cosine,
-    speed_and_slope,
-    time_to_turn,
-    turned,
-)
+from lathe_chatter.lathe.integrator import spindle
+
+sine_and_cosine, turned = with_entry(spindle.sine_and_cosine), with_entry(spindle.turned)
+speed_and_slope = with_entry(spindle.speed_and_slope)
+time_to_turn = with_entry(spindle.time_to_turn)
 
 _LAWS = [  # base rev/s, slope rev/s2, amplitude, phase, frequency Hz
     (50.0, 0.0, 0.0, 0.0, 1.0),

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from support.python_entry import with_entry
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.lathe.integrator import surface
+
+surface_at, forget = with_entry(surface.surface_at), with_entry(surface.forget)
 
 _QUINTIC = Polynomial([0.3, -1.0, 2.0, 0.7, -1.3, 0.4])
 
@@ -26,7 +29,7 @@ def _nodes(angles: list[float]) -> Array:
 
 @pytest.mark.parametrize('angle', [0.1, 0.13, 0.37, 0.4])
 def test_a_quintic_is_held_exactly(angle: float) -> None:
-    height, slope, curvature = surface.surface_at(_nodes([-0.2, 0.1, 0.4]), 1, angle)
+    height, slope, curvature = surface_at(_nodes([-0.2, 0.1, 0.4]), 1, angle)
     assert height == pytest.approx(_QUINTIC(angle), rel=1e-14)
     assert slope == pytest.approx(_QUINTIC.deriv()(angle), rel=1e-13)
     assert curvature == pytest.approx(_QUINTIC.deriv(2)(angle), rel=1e-12)
@@ -36,8 +39,8 @@ def test_a_corner_has_two_sides() -> None:
     nodes = _nodes([-0.2, 0.1, 0.4])
     nodes[surface.SLOPE_AFTER, 1] += 5.0
     nodes[surface.CURVATURE_AFTER, 1] -= 3.0
-    before = surface.surface_at(nodes, 0, 0.1)
-    after = surface.surface_at(nodes, 1, 0.1)
+    before = surface_at(nodes, 0, 0.1)
+    after = surface_at(nodes, 1, 0.1)
     assert after[0] == pytest.approx(before[0], rel=1e-14)
     assert after[1] - before[1] == pytest.approx(5.0, rel=1e-12)
     assert after[2] - before[2] == pytest.approx(-3.0, rel=1e-12)
@@ -54,7 +57,7 @@ def test_the_error_of_the_hold_falls_with_the_sixth_power_of_the_step() -> None:
                 7.0 * angle
             )
         places = 0.5 + width * np.linspace(0.0, 1.0, 101)
-        held = np.array([surface.surface_at(nodes, 0, place)[0] for place in places])
+        held = np.array([surface_at(nodes, 0, place)[0] for place in places])
         errors.append(np.abs(held - np.sin(7.0 * places)).max())
     assert errors[0] > 2.0**5.5 * errors[1]
 
@@ -63,16 +66,16 @@ def test_before_the_first_turn_the_surface_is_smooth() -> None:
     nodes = surface.fresh_surface(3e-6, 200.0, 16)
     assert nodes.shape == (surface.NODE_SIZE, 16)
     for place in (-200.0, -60.3, 0.0):
-        height, slope, curvature = surface.surface_at(nodes, 0, place)
+        height, slope, curvature = surface_at(nodes, 0, place)
         assert height == pytest.approx(3e-6, rel=1e-14)
         assert (slope, curvature) == (0.0, 0.0)
 
 
 def test_a_later_origin_moves_places_and_nothing_else() -> None:
     nodes = _nodes([-0.2, 0.1, 0.4, 0.9])
-    before = [surface.surface_at(nodes, left, 0.05 + 0.3 * left) for left in (1, 2)]
-    surface.forget(nodes, 1, 3, 1.0)
-    after = [surface.surface_at(nodes, left - 1, 0.05 + 0.3 * left - 1.0) for left in (1, 2)]
+    before = [surface_at(nodes, left, 0.05 + 0.3 * left) for left in (1, 2)]
+    forget(nodes, 1, 3, 1.0)
+    after = [surface_at(nodes, left - 1, 0.05 + 0.3 * left - 1.0) for left in (1, 2)]
     for old, new in zip(before, after, strict=True):
         assert new == pytest.approx(old, rel=1e-9)
 
@@ -83,8 +86,8 @@ def test_a_surface_counted_otherwise_is_the_same_surface() -> None:
     old, new, ratio = 0.7, 0.2, 2.5
     other = surface.recounted(nodes[:, :3], start, ratio, ahead, np.array([old, new]))
     for place in (0.15, 0.2, 0.39):
-        height, slope, _ = surface.surface_at(nodes, 1, place)
-        again, slope_again, _ = surface.surface_at(other, 1, (place - start) * ratio)
+        height, slope, _ = surface_at(nodes, 1, place)
+        again, slope_again, _ = surface_at(other, 1, (place - start) * ratio)
         absolute = height + old * (place - start) - ahead
         assert again + new * (place - start) * ratio == pytest.approx(absolute, rel=1e-12)
         assert (slope_again + new) * ratio == pytest.approx(slope + old, rel=1e-12)
