@@ -6,7 +6,7 @@ import warnings
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.errors import ParameterError, optional
@@ -14,13 +14,14 @@ from lathe_chatter.executors import RETRIES, Processes, cores
 from lathe_chatter.model.quantity_fields import count_of
 
 _DASK_TIMEOUT = 10.0
-_OF_LOCAL_WORKERS = {
+_SETTINGS = {
     'distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_': 2**26,
     'distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_': 2**25,
     'distributed.worker.profile.enabled': False,
+    'distributed.admin.large-graph-warning-threshold': '1 GB',
 }
-"""With what Dask sets, each block of samples is given back to the system and asked for again,
-which takes half as long as computing it."""
+"""Of Dask. As it sets its workers, each block of samples is given back to the system and asked for
+again, which takes half as long as computing it; and it warns of batches of many lathes."""
 
 
 def add_executor(parser: ArgumentParser, usual: str = 'threads, one a core') -> None:
@@ -64,17 +65,16 @@ def open_executor(workers: int | None = None, cluster: str | None = None) -> Ite
         with Processes(workers) if workers else ThreadPoolExecutor(cores()) as pool:
             yield pool
         return
-    dask, local = optional('distributed', 'A cluster'), nullcontext(cluster)
-    if cluster == 'local':
-        with optional('dask', 'A cluster').config.set(_OF_LOCAL_WORKERS):
-            local = dask.LocalCluster(
-                workers or cores(), threads_per_worker=1, dashboard_address=None
-            )
-    with local as address:
+    dask, settings = optional('distributed', 'A cluster'), optional('dask', 'A cluster').config
+    with settings.set(_SETTINGS), ExitStack() as stack:
+        address = cluster
+        if cluster == 'local':
+            count = workers or cores()
+            local = dask.LocalCluster(count, threads_per_worker=1, dashboard_address=':0')
+            address = stack.enter_context(local)
         try:
-            client = dask.Client(address, timeout=_DASK_TIMEOUT)
+            client = stack.enter_context(dask.Client(address, timeout=_DASK_TIMEOUT))
         except (OSError, ValueError, TypeError):
             allowed = 'local, or the address of a Dask scheduler that answers: tcp://host:8786'
             raise ParameterError('--cluster', cluster, '', allowed) from None
-        with client:
-            yield client.get_executor(retries=RETRIES)
+        yield client.get_executor(retries=RETRIES)

@@ -24,12 +24,6 @@ from lathe_chatter.stability import safe_limit
 from lathe_chatter.stability.batch_roots import operating_points
 from lathe_chatter.stability.characteristic import Complex
 
-PLACE = ('machine', 'run', 'seed', 'start')
-TRUTH = (
-    *('growth_rate', 'frequency', 'stable', 'regime', 'share_out_of_cut', 'share_on_bearing'),
-    'seconds_since_onset',
-)
-"""The columns of a window beside its signals and what was drawn; card.md.j2 says what they are."""
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""
 _REGIMES = np.array(['free', 'rattling', 'seated'])
@@ -147,14 +141,20 @@ def _windows(plan: Plan, run: DrawnRun, roots: Complex, stable: NDArray[np.bool_
     )
     drawn = [LatheConfig(run.config.setup, cut).parameters() for cut in run.cuts.values()]
     values = {name: np.array([each[name] for each in drawn])[now] for name in plan.drawn}
-    facts = (
-        *(run.machine, run.number, run.config.setup.seed, starts / rate),
-        *(roots.real[now], roots.imag[now] / (2.0 * np.pi), stable[now]),
-        *(_REGIMES[(on_bearing > 0.0).astype(int) + (on_bearing >= 1.0)], out_of_cut, on_bearing),
-        (ends - onset[now]) / rate,
-    )
-    found = {n: np.resize(v, len(starts)) for n, v in zip((*PLACE, *TRUTH), facts, strict=True)}
-    return {**found, **signals, **values}
+    facts = {  # card.md.j2 says what they are
+        'machine': run.machine,
+        'run': run.number,
+        'seed': run.config.setup.seed,
+        'start': starts / rate,
+        'growth_rate': roots.real[now],
+        'frequency': roots.imag[now] / (2.0 * np.pi),
+        'stable': stable[now],
+        'regime': _REGIMES[(on_bearing > 0.0).astype(int) + (on_bearing >= 1.0)],
+        'share_out_of_cut': out_of_cut,
+        'share_on_bearing': on_bearing,
+        'seconds_since_onset': (ends - onset[now]) / rate,
+    }
+    return {n: np.resize(v, len(starts)) for n, v in facts.items()} | signals | values
 
 
 def _simulated(plan: Plan, run: DrawnRun) -> tuple[Array, Array]:
