@@ -19,7 +19,10 @@ _BLOCK = re.compile(
     r'(?:<!-- (?P<mark>[^\n]*?) -->\n)?^```(?P<kind>[a-z]+)\n(?P<text>.*?)^```$',
     re.DOTALL | re.MULTILINE,
 )
-_NODE = re.compile(r'^ros2 run lathe_chatter (?!lathe-chatter)')
+_NODE = re.compile(
+    r'^(?:ros2 run lathe_chatter )?'
+    r'(?=(?:lathe|chatter_monitor|run_recorder|cell|operator_page|chatter_supervisor)(?: |$))'
+)
 _TIMEOUT = 280.0
 """s: less than that of the test, so that its failure says which command it was."""
 
