@@ -15,6 +15,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.nodes.joint_states import joint_states, time_message
+from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
 from lathe_chatter.samples.codec import encode_block, encode_number
@@ -29,6 +30,9 @@ _HISTORY = 4.0
 """Seconds, by the clock on the wall, that a reader may fall behind before it misses a tick."""
 MAX_HISTORY = 10_000
 """Ticks that are kept at most, where they come faster than in real time."""
+_TIME = SAMPLE_COLUMNS.index('time')
+_SAME = 1000
+"""ns by which the roundings of two times differ at most."""
 _LOOK_AROUND = 0.01
 """s after which a new listener is noticed."""
 
@@ -45,6 +49,9 @@ class LatheTopics:
         tick_rate: Messages a simulated second, Hz.
         factor: Simulated seconds per second, 0 for as many as there are.
         publish_clock: Whether /clock is among them.
+
+    Attributes:
+        zero: What /clock shows at time 0 of the samples, ns, where it is followed.
     """
 
     def __init__(
@@ -66,8 +73,9 @@ class LatheTopics:
             for topic, column in _SCALARS.items()
         ]
         # Without a /clock nobody knows simulated time: stamps are the node's then.
-        clocked = publish_clock or node.get_parameter('use_sim_time').value
-        self._now = None if clocked else node.get_clock().now
+        self._follows = bool(node.get_parameter('use_sim_time').value)
+        self._now = None if publish_clock or self._follows else node.get_clock().now
+        self._log, self.zero = BoundedLog(QuickLog(node.get_logger())), 0
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
         self._looked_around = -_LOOK_AROUND
@@ -85,6 +93,8 @@ class LatheTopics:
         self._samples.publish(encode_block(samples, columns))
         self._look_around()
         last = samples[-1]
+        if self._follows:
+            self._follow(stamp - round(last[_TIME] * 1e9))
         for publisher, column in self._heard_scalars:
             publisher.publish(encode_number(last[column]))
         if self._heard_joints:
@@ -92,11 +102,19 @@ class LatheTopics:
             self._joints.publish(joint_states(last, when))
         self.publish_clock(stamp)
 
+    def _follow(self, zero: int) -> None:
+        """Say where the samples are on another's /clock, ns, whenever that is new."""
+        if abs(zero - self.zero) > _SAME:
+            self.zero = zero
+            said = f'Time 0 of the samples is {zero / 1e9:.6f} s of /clock.'
+            self._log.info(said, 'clock')
+
     def _look_around(self) -> None:
         """See from time to time who listens: to ask at each tick costs as much as a sample."""
         now = time.monotonic()
         if now - self._looked_around >= _LOOK_AROUND:
             self._looked_around = now
+            self._log.look()
             self._heard_scalars = [s for s in self._scalars if s[0].get_subscription_count()]
             self._heard_joints = self._joints.get_subscription_count() > 0
 

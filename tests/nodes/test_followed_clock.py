@@ -13,9 +13,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from support.node_bench import LATCHED, Bench
 
 from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.samples import SAMPLE_COLUMNS
 
 
 def moment(milliseconds: int) -> Time:
@@ -103,6 +105,27 @@ def test_a_clock_that_goes_back_or_stands_still_is_told(
     clock.show(50_004)
     clock.said('/clock goes on at 50.004 s.')
     clock.show(50_006)
+
+
+def test_where_the_samples_are_on_the_clock_is_told_at_each_jump(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    clock = FollowedClock(start, bench, force_noise=0.1)  # no two displacements are equal
+    blocks = bench.listen(Float64MultiArray, '/lathe/samples')
+    clock.show(*range(100_000, 100_080, 2), *range(50_000, 50_080, 2))
+    clock.cut_until(50_078)
+    clock.said('Time 0 of the samples is 100.0')
+    clock.said('Time 0 of the samples is 49.')
+    told = [float(each.split()[6]) for each in clock.said('Time 0 of the samples')]
+    time, place = (SAMPLE_COLUMNS.index(name) for name in ('time', 'tool_displacement'))
+    width = len(SAMPLE_COLUMNS)
+    ends = {block.data[place - width]: block.data[time - width] for block in blocks}
+    joints = [joint for joint in clock.joints if joint.position[0] in ends]
+    assert len(joints) > 10
+    for joint in joints:
+        stamp = joint.header.stamp.sec + joint.header.stamp.nanosec / 1e9
+        offset = stamp - ends[joint.position[0]]
+        assert min(abs(offset - zero) for zero in told) < 2e-6
 
 
 def test_without_a_clock_it_waits_and_says_so(start: Callable[..., Any], bench: Bench) -> None:
