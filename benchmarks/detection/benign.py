@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from statistics import median
 from typing import Any
 
@@ -20,6 +21,7 @@ from simulator import COLUMNS, RATE, Stretch, Surroundings, simulate
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.executors import spread
+from lathe_chatter.model import Machine
 from lathe_chatter.stability import rightmost_root
 
 
@@ -112,9 +114,9 @@ def advice(options: Any) -> list[str]:
     return advice_figures(16 if options.quick else 200, options.executor)
 
 
-def _spent(samples: Array, size: int) -> float:
+def _spent(samples: Array, size: int, machine: Machine | None = MACHINE) -> float:
     """CPU time for all but the first second, s."""
-    detector = ChatterDetector()
+    detector = ChatterDetector(machine)
     detector.update(samples[:10000], COLUMNS)
     begin = time.process_time()
     for start in range(10000, len(samples), size):
@@ -125,12 +127,35 @@ def _spent(samples: Array, size: int) -> float:
 def cpu(options: Any) -> list[str]:
     """What the detector takes, in batches of 0.1 s and as the node gets them."""
     seconds = 3.0 if options.quick else 20.0
-    samples = simulate((Stretch(seconds + 1.0, 3000.0, 0.4e-3),), NOISES['S1'], 0)
+    stable = simulate((Stretch(seconds + 1.0, 3000.0, 0.4e-3),), NOISES['S1'], 0)
+    loud = (Stretch(2.0, 3000.0, 0.4e-3), Stretch(seconds - 1.0, 3000.0, 1.1e-3))
+    amid = simulate(loud, NOISES['S3'], 0)
     lines = []
-    for size in (1000, HOP, 20):
-        spent = median(_spent(samples, size) for _ in range(5)) / seconds
-        lines.append(
-            f'CPU in batches of {size:4d} samples: {1e3 * spent:.2f} ms a simulated second '
-            '(median of 5)'
-        )
-    return lines
+    for label, samples in (('a stable cut', stable), ('chatter', amid)):
+        for machine in (MACHINE, None):
+            for size in (1000, HOP, 20):
+                spent = median(_spent(samples, size, machine) for _ in range(5)) / seconds
+                told = 'told' if machine is not None else 'not told'
+                lines.append(
+                    f'CPU, {label}, machine {told}, batches of {size:4d} samples: '
+                    f'{1e3 * spent:.2f} ms a simulated second (median of 5)'
+                )
+    return [*lines, _advice_time(amid)]
+
+
+def _advice_time(samples: Array) -> str:
+    """What an answer takes when it is asked for."""
+    detector, requests = ChatterDetector(), []
+    for start in range(0, len(samples), HOP):
+        request = detector.update(samples[start : start + HOP], COLUMNS).request
+        if request is not None and request not in requests:
+            requests.append(request)
+    spent = []
+    for request in requests:
+        for _ in range(5):
+            again = replace(request)
+            begin = time.process_time()
+            _ = again.answer
+            spent.append(time.process_time() - begin)
+    middle, most = 1e3 * np.median(spent), 1e3 * np.max(spent)
+    return f'CPU, advice, each time it is asked for: {middle:.1f} ms, {most:.1f} ms at most'

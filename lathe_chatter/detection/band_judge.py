@@ -14,7 +14,10 @@ from lathe_chatter.detection.cut_identification import FIT, NOISE_SUMS, cutting_
 from lathe_chatter.detection.detector_state import (
     CHATTER,
     HOPS,
+    REJECTED,
     SERIOUSNESS,
+    TRUSTED,
+    UNCHECKED,
     UNKNOWN,
     WINDOWS,
     new_state,
@@ -23,7 +26,7 @@ from lathe_chatter.detection.filters import Band, design, gain, pace_of, thinnin
 from lathe_chatter.detection.hops import StreamFormat
 from lathe_chatter.detection.machine_check import MachineFit, Verdict
 from lathe_chatter.detection.signal_conditioning import HOP_SUMS, SETTINGS, new_memory
-from lathe_chatter.detection.speed_advice import Identified, SpeedAdviser
+from lathe_chatter.detection.speed_adviser import Identified, SpeedAdviser
 from lathe_chatter.detection.structured_arrays import record
 from lathe_chatter.model import Machine
 
@@ -78,7 +81,7 @@ class BandJudge:
     Attributes:
         hop: Samples in a hop.
         state: What is known, `now` above all.
-        believed: Whether the machine is, if there is one.
+        believed: Whether the machine is, if there is one: it is until it is seen to be wrong.
         fit: Of the machine.
         adviser: As given.
         margin: By what fraction C w may still grow, and its standard error.
@@ -125,7 +128,7 @@ class BandJudge:
             has_angle=2 if form.nominal else form.angle,
             has_workpiece=form.workpiece,
             has_machine=self._full,
-            believed=1,
+            believed=UNCHECKED,
         )
         middle = complex(0.0, 2.0 * math.pi * band.middle)
         # Ten times the smallest: what is identified from less than that is rounding as well.
@@ -162,7 +165,7 @@ class BandJudge:
     @property
     def believed(self) -> bool:
         """Whether a machine is there and believed."""
-        return self._full and bool(self._settings['believed'][0])
+        return self._full and self._settings['believed'][0] != REJECTED
 
     @property
     def speed(self) -> float:
@@ -259,10 +262,10 @@ class BandJudge:
         """Believe the machine while it fits, judge without while it does not."""
         fit = self.fit
         if fit.verdict is Verdict.FITS:
-            self._settings['believed'] = 1
+            self._settings['believed'] = TRUSTED
         if fit.verdict is not Verdict.MISFIT:
             return
-        self._settings['believed'] = 0
+        self._settings['believed'] = REJECTED
         if fit.is_correctable and not self._now.alarmed and self._now.score < _UNSUSPICIOUS:
             self.correction = fit.frequency, fit.error
 

@@ -16,7 +16,15 @@ from lathe_chatter.detection.cut_identification import (
     rightmost_in_band,
 )
 from lathe_chatter.detection.decision import judge
-from lathe_chatter.detection.detector_state import CHATTER, HOPS, IDLE, WINDOWS, DetectorState
+from lathe_chatter.detection.detector_state import (
+    CHATTER,
+    HOPS,
+    IDLE,
+    REJECTED,
+    UNCHECKED,
+    WINDOWS,
+    DetectorState,
+)
 from lathe_chatter.detection.filters import Kernels
 from lathe_chatter.detection.machine_check import take_hop
 from lathe_chatter.detection.signal_conditioning import Memory, follow
@@ -109,7 +117,7 @@ def take_hops(
     settings, mechanics, now = settings_[0], mechanics_[0], state.now[0]
     noise, total = noise_[0], total_[0]
     done, hop = 0, settings.hop
-    model = settings.has_machine != 0 and settings.believed != 0
+    model = settings.has_machine != 0 and settings.believed != REJECTED
     count = block.shape[0] // hop
     turns = kernels.poles ** (hop // settings.thinning)
     centres = np.empty(kernels.poles.size)
@@ -120,7 +128,8 @@ def take_hops(
     while done < count:
         samples = block[done * hop : (done + 1) * hop]
         done += 1
-        between = 1 <= now.holding <= 2 or now.ramping != 0 or now.alarmed != 0
+        between = 1 <= now.holding <= 2 or now.ramping != 0
+        between = between or (now.alarmed != 0 and settings.believed != UNCHECKED)
         take_hop(memory.fit, not between and now.hops_seen > _FIT_AFTER)
         newest = (now.newest + 1) % HOPS
         now.newest = newest

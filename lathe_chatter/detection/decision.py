@@ -30,7 +30,13 @@ from lathe_chatter.detection.baseline import (
     restart_baseline,
 )
 from lathe_chatter.detection.best_window import is_cutting, state_of, write_figures
-from lathe_chatter.detection.detector_state import HOPS, WINDOWS, DetectorState
+from lathe_chatter.detection.detector_state import (
+    HOPS,
+    REJECTED,
+    UNCHECKED,
+    WINDOWS,
+    DetectorState,
+)
 from lathe_chatter.detection.filters import Complex
 from lathe_chatter.detection.signal_conditioning import PHASE_SEEN
 from lathe_chatter.detection.structured_arrays import Records
@@ -67,13 +73,18 @@ _LOUD = 6.0
 """Logarithm of the energy ratio from which on noise matters so little that shorter windows do."""
 _LOUD_LIMITS = (5.0, 3.5)
 """Growth rate over its standard error that is an alarm then, in the two windows before."""
+_TRANSIENT, _COHERENT = 2, 0.975
+"""Newest hops after a disturbance, and the coherence of force and chip in them which no machine
+has that was told wrong by more than some 5 %."""
 _RAISED = 1.5
 """Logarithm of the energy ratio without which the growth rate alone is no alarm."""
 
 _OFF_PHASE, _ON_PHASE = 0.2, 0.9
 """Once-per-turn variance over all: below the spindle's own vibration, above chatter."""
 _OUT_OF_CUT = 0.9
-_STEADY = 0.05
+_STEADY, _SHORT, _STEADIER = 0.12, 32, 0.1
+"""Spread of the energy over its mean, over all hops that are remembered and over so many, that is
+steady: noise in a mode has several times as much."""
 _SATURATED = 20
 _CALM, _PERSISTENT = 20, 20
 _QUIET, _RECENT, _LASTING = 0.12, 3, 32
@@ -152,14 +163,50 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
 
 
 @compiled(borrows=True, inner=True)
+def _unchecked_score(
+    now: Any, products: Records, windows: Records, full: float, plain: float
+) -> float:
+    """The same while nobody knows whether the machine was told right: more must speak for it.
+
+    Told too low it makes every cut unstable, told too high none. So the energy counts as without
+    a machine; the identified growth counts after a disturbance that stands so clearly out of the
+    noise that F = C w h would not hold with another machine.
+
+    Args:
+        now: Of the state.
+        products: Sums of the last hops (HOPS,), as a ring.
+        windows: As identified.
+        full: The score by the machine.
+        plain: The score without.
+    """
+    if now.holding != 0:
+        both = force = chip = 0.0
+        for back in range(min(max(1, now.holding - 1), _TRANSIENT)):
+            hop = products[(now.newest - back) % HOPS]
+            both += hop.force_chip
+            force += hop.force_force
+            chip += hop.chip_chip
+        coherent = both > 0.0 and both * both > _COHERENT * force * chip
+        return max(full, plain) if coherent else plain
+    trust = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0)
+    if now.rise == now.rise and trust < 1.0:
+        limit = _ENERGY_LIMIT * _BLURRED * (1.0 - trust) + _ENERGY_ALONE * trust
+        blurred: float = now.rise / limit
+        if now.stepped != 0:
+            blurred /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
+        return max(plain, blurred)
+    return plain
+
+
+@compiled(borrows=True, inner=True)
 def _saturated(
-    state: DetectorState, products: Records, newest: int, strongest: int, stiff: float
+    state: DetectorState, products: Records, newest: int, strongest: int, stiff: float, grows: bool
 ) -> bool:
     """Whether the chatter has grown as far as it can: it is steady, and not the spindle's own."""
     now = state.now[0]
-    if not now.once_per_turn > _ON_PHASE or now.hops_seen < HOPS:
+    if not now.once_per_turn > _ON_PHASE:
         return False
-    if stiff > 0.0:
+    if stiff > 0.0 and now.hops_seen >= HOPS:
         mean = power = count = 0.0
         for back in range(16):
             hop = products[(newest - back) % HOPS]
@@ -170,13 +217,15 @@ def _saturated(
         usual = now.usual_misfit if now.usual_misfit == now.usual_misfit else 0.0
         if pulsation > _OUT_OF_CUT * mean and mean > 10.0 * math.sqrt(usual):
             return True
+    # Where the cut grows, by the machine, a shorter time says enough.
+    length, limit = (_SHORT, _STEADIER) if grows else (HOPS, _STEADY)
     total = squares = 0.0
-    for back in range(HOPS):
+    for back in range(length):
         energy = abs(state.motion[(newest - back) % HOPS, strongest]) ** 2
-        total += energy / HOPS
-        squares += energy**2 / HOPS
+        total += energy / length
+        squares += energy**2 / length
     spread = math.sqrt(max(squares - total**2, 0.0))
-    return spread < _STEADY * total
+    return spread < limit * total
 
 
 @compiled(borrows=True, inner=True)
@@ -227,9 +276,11 @@ def judge(
     """
     now = state.now[0]
     newest, period = now.newest, settings.period
-    model = settings.has_machine != 0 and settings.believed != 0
+    model = settings.has_machine != 0 and settings.believed != REJECTED
     follow_speed(state, speed, 1.0 / max(speed * period, 1e-9))
     strongest = follow_energy(state, newest)
+    # Without a baseline the growth rate would be alone, and what dies down into noise has any.
+    unchecked = model and (settings.believed == UNCHECKED or now.rise != now.rise)
     if settings.has_machine == 0:
         loudest = follow_lines(state, newest)
         if now.by_line != 0 or now.rise != now.rise:
@@ -241,7 +292,7 @@ def judge(
     if seen >= 1.0:
         follow_phase(state, phases)
     wave = (np.nan, np.nan, np.nan)
-    if not model or now.rise > ARMED:
+    if not model or unchecked or now.rise > ARMED:
         fresh = now.since_jump - 2.0 - 1.0 / max(speed * period, 1e-9)
         for number in range(_SHORTEST_BY_ENERGY, WINDOWS.size):
             length = min(WINDOWS[number], HOPS - 1)
@@ -270,16 +321,24 @@ def judge(
     )
     now.score = _score(state, windows, model, forced) if known else 0.0
     state.plain_scores[newest] = 0.0
-    if model and known and now.rise > ARMED:
-        # The machine may be another than was told: what lasts is believed without it.
+    if model and known and (unchecked or now.rise > ARMED):
         state.plain_scores[newest] = _score(state, plain, not model, forced)
+    if unchecked and known:
+        alone = state.plain_scores[newest]
+        now.score = _unchecked_score(now, products, windows, now.score, alone)
+    elif model and known and now.rise > ARMED:
+        # The machine may be another than was told: what lasts is believed without it.
         lasting = np.inf
         for back in range(_PERSISTENT):
             lasting = min(lasting, state.plain_scores[(newest - back) % HOPS])
         now.score = max(now.score, lasting)
-    stiff = settings.tool_stiffness if model else 0.0
-    if now.alarmed == 0 and now.ramping == 0 and speed > 0.0:
-        steady = _saturated(state, products, newest, strongest, stiff)
+    # A force that would make C w negative is none.
+    sound = model and identified[WINDOWS.size - 1].cutting > 0.0
+    stiff = settings.tool_stiffness if sound else 0.0
+    grows = model and _grows(identified)
+    shortest = _SHORT if grows else HOPS
+    if now.alarmed == 0 and now.ramping == 0 and speed > 0.0 and now.hops_seen >= shortest:
+        steady = _saturated(state, products, newest, strongest, stiff, grows)
         now.saturated = now.saturated + 1 if steady else 0
     _decide(state, amplitude, recent)
     write_figures(state, windows, wave, model, amplitude)

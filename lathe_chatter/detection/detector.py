@@ -18,7 +18,7 @@ from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filters import HIGHEST_SEEN, UNKNOWN_MACHINE, Band, band_of, bands_of
 from lathe_chatter.detection.hops import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.line_watch import LineWatch
-from lathe_chatter.detection.speed_advice import SpeedAdviser
+from lathe_chatter.detection.speed_adviser import SpeedAdviser
 from lathe_chatter.detection.structured_arrays import values_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine
@@ -174,7 +174,10 @@ class ChatterDetector:
                 for band, adviser in zip(bands, self._advisers, strict=False)
             ]
             listens = bool(bands) and (form.mixed or not form.angle)
-            self._lines = LineWatch(self._judges, self._thresholds.strictness) if listens else None
+            self._lines = None
+            if listens:
+                seen = form.angle and not form.nominal
+                self._lines = LineWatch(self._judges, self._thresholds.strictness, angle=seen)
         usual = max(1, round(_LOOK * form.rate))
         narrow = len(self._judges) == 1 and self._lines is None
         self._framer.hop = self._judges[0].hop if narrow else usual
@@ -259,7 +262,7 @@ class ChatterDetector:
             engaged,
             now['once_per_turn'],
             now['score'],
-            judge.adviser.advice,
+            judge.adviser.request,
             self._framer.faults(),
             words,
             *(judge.margin if mode.knows_machine and not now['alarmed'] else (math.nan, math.nan)),

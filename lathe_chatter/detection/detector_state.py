@@ -21,6 +21,8 @@ SPEEDS = 5
 
 # States, in the order of `estimate.STATES`.
 IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = range(6)
+REJECTED, TRUSTED, UNCHECKED = range(3)
+"""What has become of the machine that was told: it does not fit, it fits, or nobody knows yet."""
 SERIOUSNESS = (1, 2, 4, 5, 3, 0)
 """Of the states, where several bands are judged: the most serious one is said."""
 

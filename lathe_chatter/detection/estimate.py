@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 from lathe_chatter.detection.speed_advice import Advice
+from lathe_chatter.detection.speed_adviser import AdviceRequest
 from lathe_chatter.html_table import html_table
 from lathe_chatter.model import Machine
 
@@ -91,7 +92,7 @@ class Estimate:
         once_per_turn: Variance at one spindle angle from turn to turn, over all variance: near
             1 for chatter, near 0 for vibration that is the spindle's own.
         score: Suspicion; 1 raises the alarm.
-        advice: What to do about the chatter.
+        request: For advice about the chatter; `advice` is the answer.
         machine_fit: What is heard of a machine that was told wrong; empty where it fits.
         margin: By what fraction the depth of cut may still grow, negative beyond the limit; known
             while there is no alarm.
@@ -115,7 +116,7 @@ class Estimate:
     bearing_engaged: bool | None = None
     once_per_turn: float = math.nan
     score: float = math.nan
-    advice: Advice = field(default_factory=Advice)
+    request: AdviceRequest | None = None
     faults: tuple[str, ...] = ()
     machine_fit: str = ''
     margin: float = math.nan
@@ -135,6 +136,11 @@ class Estimate:
         if not self.spindle_speed_rpm > 0.0:
             return math.nan
         return 60.0 * self.frequency / self.spindle_speed_rpm
+
+    @property
+    def advice(self) -> Advice:
+        """What to do about the chatter: it is looked for when it is asked for first."""
+        return Advice() if self.request is None else self.request.answer
 
     @property
     def recommended_speed_rpm(self) -> float:

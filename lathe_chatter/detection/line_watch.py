@@ -3,7 +3,8 @@
 Where the spindle is not seen, or sound is all there is, the rise of a vibration tells little: a
 cut that begins is louder too. But chatter is one tone that holds nearly all the power, and keeps
 its amplitude, where cutting and an idle machine have many lines, and a mode that noise excites
-swells and fades. Nor does a rise of energy raise an alarm here but where a line holds the power.
+swells and fades. Nor does a rise of energy raise an alarm here but where a line holds the power:
+of the last hops, where the spindle's angle has freed the signal of all that repeats with it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection.band_judge import BandJudge
+from lathe_chatter.detection.detector_state import HOPS
 
 _SHARE, _GONE = 0.55, 0.3
 """Part of all power in the line that makes an alarm, and below which it is over."""
@@ -27,6 +29,8 @@ _PRESENT = 0.2
 """Part of its mean power that a line must have now: what has ended stands in the mean for long."""
 _LOOKS, _LOOKS_GONE = 3, 4
 """Looks in a row that must find it, and that must find none any more."""
+_NEWEST = 8
+"""Hops whose power is looked at where a rise is enough."""
 _OTHER = 0.08
 """Part by which a line is another line: chatter keeps its frequency."""
 
@@ -37,11 +41,12 @@ class LineWatch:
     Args:
         judges: Of the bands, rising; they raise no alarm by themselves any more.
         strictness: The score that makes an alarm.
+        angle: Whether the spindle's angle is seen.
     """
 
-    def __init__(self, judges: Sequence[BandJudge], strictness: float) -> None:
+    def __init__(self, judges: Sequence[BandJudge], strictness: float, *, angle: bool) -> None:
         """Nothing found."""
-        self._judges = judges
+        self._judges, self._angle = judges, angle
         self._strictness = strictness
         for judge in judges:
             judge.state.now[0].strictness = np.inf
@@ -60,6 +65,8 @@ class LineWatch:
         place = int(powers[best].argmax())
         share = _with_neighbour(powers[best], place) / total
         audible = total > _QUIET * self._loudest
+        if self._angle and audible:
+            self._hear_rise()
         self._weigh(self._judges[best], place, share if audible else 0.0)
         for k, judge in enumerate(self._judges):
             now = judge.state.now[0]
@@ -70,6 +77,24 @@ class LineWatch:
                 now.line_gone += 1
                 if now.line_gone >= _LOOKS_GONE:
                     judge.end_alarm()
+
+    def _hear_rise(self) -> None:
+        """Raise the alarm where a band's energy has risen enough, and a line holds the newest."""
+        judge = max(self._judges, key=lambda each: float(each.state.now[0].score))
+        now = judge.state.now[0]
+        if not now.score >= self._strictness or now.by_line:
+            return
+        total = line = 0.0
+        for each, weights in zip(self._judges, self._weights, strict=True):
+            last = int(each.state.now[0].newest) - np.arange(_NEWEST)
+            powers = (np.abs(each.state.motion[last % HOPS]) ** 2).mean(axis=0) * weights
+            total += float(powers.sum()) / each.overlap
+            if each is judge:
+                place = int(powers.argmax())
+                line = _with_neighbour(powers, place)
+        if line > _SHARE * total:
+            self._hertz = float(judge.centres[place])
+            judge.raise_by_line()
 
     def _is_same(self, hertz: float) -> bool:
         """Whether this is the frequency of the line that was found last."""

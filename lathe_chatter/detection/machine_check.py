@@ -33,8 +33,14 @@ _BLOCKS = 4
 _FEWEST_OUTPUTS = 200.0
 _INFLATION = 1.25
 """Of standard errors, found by simulation: outputs that overlap are not independent."""
+_MODEL_ERROR = 3e-4
+"""Misfit of a machine that is right, as a part of the force's power: J asks no more than that."""
 _MOST_J = 5.0
 """Sargan's J over its degrees of freedom, up to which the equation is believed (good: 2.4)."""
+_FEWEST_BLOCKS = 2
+"""Blocks without which no machine is called wrong."""
+_NEGATIVE = 2.0
+"""Standard errors by which C w may be below 0: what says more knows nothing of k either."""
 _VAGUE, _CORRECTABLE = 0.025, 0.01
 """Relative standard errors from which on nothing is judged, and below which it is corrected: with
 less clear instruments the frequency comes out too high."""
@@ -183,7 +189,8 @@ class MachineFit:
 
     def close_block(self, sums: FitSums, *, jumped: bool) -> None:
         """Take a block in, if it is long enough, and judge; after a jump there is another cut."""
-        if sums.counts[0] >= _FEWEST_OUTPUTS and (block := _solved(sums)) is not None:
+        block = _solved(sums) if sums.counts[0] >= _FEWEST_OUTPUTS else None
+        if block is not None and block.cutting > -_NEGATIVE * block.cutting_error:
             self._blocks.append(block)
             self._same_cut += 1
             self._judge()
@@ -211,8 +218,10 @@ class MachineFit:
         off_by, spread = told / self.frequency - 1.0, 2.0 * self.error / self.frequency
         if spread > 2.0 * _VAGUE:
             return
-        if off_by - spread > 0.01 or off_by + spread < -0.015:
-            self.verdict = Verdict.MISFIT
+        surely = 1.5 * spread  # it is looked at again and again
+        if off_by - surely > 0.01 or off_by + surely < -0.015:
+            if len(self._blocks) >= _FEWEST_BLOCKS:
+                self.verdict = Verdict.MISFIT
         elif off_by + spread < 0.03 and off_by - spread > -0.04:
             self.verdict = Verdict.FITS
 
@@ -239,7 +248,8 @@ def _solved(sums: FitSums) -> _Block | None:
     except np.linalg.LinAlgError:
         return None
     weights = np.array([1.0, *(-slopes)])
-    variance = float((weights @ sums.fitted[0].real @ weights) / (2.0 * sums.counts[0]))
+    left = weights @ sums.fitted[0].real @ weights + _MODEL_ERROR * sums.fitted[0, 0, 0].real
+    variance = float(left / (2.0 * sums.counts[0]))
     if not variance > 0.0:
         return None
     misfit = float(weights @ normal @ weights) / variance

@@ -55,7 +55,8 @@ SETTINGS = record_type(
 """How samples are read and judged: sample rate, Hz; length of a hop, s; gain of the band pass;
 stiffness, N/m; amplitude from which on the spindle's own vibration is told, m; slowest speed,
 rev/s. Samples in a hop and in a thinned sample, thinned samples in an output; what is
-there (2: an angle from a speed that is only nominal), and whether the machine is believed."""
+there (2: an angle from a speed that is only nominal), and what has become of the machine that was
+told (`detector_state.UNCHECKED`)."""
 
 
 class Memory(NamedTuple):

@@ -1,10 +1,9 @@
-"""A better spindle speed for the cut that was identified, or a smaller depth; and when."""
+"""A better spindle speed for the cut that was identified, or a smaller depth."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +21,7 @@ _SHARE = 0.98
 _MOST = 3
 _SAME = 0.02
 """Part by which speeds may differ that come from one cut, identified twice."""
-_ANOTHER_SPEED = 0.01
+ANOTHER_SPEED = 0.01
 """Part by which a speed must differ from the one that was advised for to be another."""
 _RULE_HOLDS = 0.3
 """Part of the speeds by the rule of thumb that are stable; benchmarks/detection prints it."""
@@ -34,16 +33,6 @@ _WIDE, _AS_GOOD = 0.04, 0.8
 """Width that an ordinary spindle can keep to; part of the damping that the middle must have."""
 _RULE_LEAST, _RULE_MOST = 1, 3
 """Waves a turn that the rule of thumb tries: of more, fewer than half were stable."""
-
-
-_ADVISED_AT = (0, 2, 4, 7, 10, 15, 20, 30)
-"""Hops after the alarm, and after a change of speed that was no cure, at which a speed is
-recommended, each time from a better estimate."""
-_CLEAR_CONTACT = 0.15
-"""Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
-
-_VAGUE = 10.0
-"""Standard error of the growth rate from which on nothing is recommended, 1/s."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +82,7 @@ class Advice:
         words = self.in_words(depth)
         if self.differs_from(earlier) or not words:
             return words
-        moved = abs(self.found_at_rpm / earlier.found_at_rpm - 1.0) > _ANOTHER_SPEED
+        moved = abs(self.found_at_rpm / earlier.found_at_rpm - 1.0) > ANOTHER_SPEED
         return f'the advice stands: {words}' if moved else ''
 
     def differs_from(self, earlier: Advice) -> bool:
@@ -189,12 +178,27 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
             found.insert(0, first)
         speeds = [speed for _, speed in found[:_MOST]]
         near_ones = [speed for _, speed in damped[:_MOST]] or speeds[:1]
-        centred = [_centred(machine, depth, s, speed_range, contacts) for s in near_ones]
-        wide = [speed for speed in centred if speed.width >= _WIDE]
-        speeds[0] = wide[0] if wide else max(centred, key=lambda speed: speed.width)
+        speeds[0] = _wide_enough(machine, depth, near_ones, speed_range, contacts)
         return Advice(tuple(speeds), 1.0, current_rpm)
     contacts = both if seated is None else (seated,)
     return _less_depth(machine, depth, speed_range, contacts, cutting_error / cutting_stiffness)
+
+
+def _wide_enough(
+    machine: Machine,
+    depth: float,
+    near_ones: list[AdvisedSpeed],
+    speed_range: tuple[float, float],
+    contacts: tuple[bool, ...],
+) -> AdvisedSpeed:
+    """The middle of the first lobe that an ordinary spindle can keep to, else of the widest."""
+    best = _centred(machine, depth, near_ones[0], speed_range, contacts)
+    for speed in near_ones[1:]:
+        if best.width >= _WIDE:
+            break
+        other = _centred(machine, depth, speed, speed_range, contacts)
+        best = max(best, other, key=lambda each: each.width)
+    return best
 
 
 def _centred(
@@ -290,109 +294,3 @@ def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
     speeds = [60.0 * frequency / waves for waves in range(fewest, fewest + _RULE_MOST)]
     inside = [speed for speed in speeds if speed >= speed_range[0]]
     return Advice(tuple(AdvisedSpeed(speed, probability=_RULE_HOLDS) for speed in inside))
-
-
-class Identified(NamedTuple):
-    """What is known of a cut that chatters.
-
-    Attributes:
-        growth_rate: 1/s.
-        growth_error: Its standard error, 1/s.
-        frequency: Of the chatter, Hz.
-        spindle_speed_rpm: rev/min.
-        cutting_stiffness: C w, N/m; nan without a model.
-        workpiece_stiffness: N/m; nan without a model.
-        cutting_error: Standard error of C w, N/m.
-    """
-
-    growth_rate: float
-    growth_error: float
-    frequency: float
-    spindle_speed_rpm: float
-    cutting_stiffness: float
-    workpiece_stiffness: float
-    cutting_error: float = 0.0
-
-
-class SpeedAdviser:
-    """Recommends speeds while there is chatter, and keeps to the estimate that is best.
-
-    Chatter that has grown so far that the tool leaves the cut grows no more, and C w looks less
-    than it is: a speed chosen for it would chatter. So an estimate counts only if it is surer
-    than those before, and its growth rate is not clearly below theirs.
-
-    Args:
-        machine: Tool, workpiece and bearing; None where nothing is known.
-        speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
-
-    Attributes:
-        machine: As given, or as `judge_with` was told.
-        advice: The one that stands.
-    """
-
-    def __init__(self, machine: Machine | None, speed_range: tuple[float, float]) -> None:
-        """Nothing chatters yet."""
-        self.machine = machine
-        self._speed_range = speed_range
-        self._advised_at = math.nan
-        self.forget()
-
-    def forget(self) -> None:
-        """There is no chatter."""
-        self.advice = Advice()
-        self._error = math.inf
-        self._surely_grew = -math.inf
-
-    def judge_with(self, machine: Machine | None) -> None:
-        """Take another machine: what was recommended stands until there is an estimate with it."""
-        self.machine = machine
-        self._error = math.inf
-        self._surely_grew = -math.inf
-
-    def is_due(self, hops_after_alarm: int) -> bool:
-        """Whether a speed is to be recommended now."""
-        return hops_after_alarm in _ADVISED_AT
-
-    def consider(self, known: Identified, hops_after_alarm: int, *, modelled: bool) -> None:
-        """Recommend from an estimate, if it is better than those before.
-
-        Args:
-            known: The estimate.
-            hops_after_alarm: At 0 there is nothing before.
-            modelled: Whether C w was identified; else the rule 60 f_c / k has to do.
-        """
-        if hops_after_alarm == 0:
-            self.forget()
-        growth, error = known.growth_rate, known.growth_error
-        if growth < -error or error > _VAGUE:
-            return  # it dies down, or nobody knows
-        tried = abs(known.spindle_speed_rpm / self._advised_at - 1.0) > _ANOTHER_SPEED
-        if tried and growth < error:
-            return  # what was recommended may yet be the cure
-        self._advised_at = known.spindle_speed_rpm
-        if self.machine is None or not modelled:
-            thumb = rule_of_thumb(known.frequency, self._speed_range)
-            self.advice = replace(thumb, found_at_rpm=known.spindle_speed_rpm)
-            return
-        if not error < self._error or growth + error < self._surely_grew:
-            return
-        self._error = error
-        self._surely_grew = max(self._surely_grew, growth - error)
-        found = advise(
-            self.machine,
-            known.cutting_stiffness,
-            self._speed_range,
-            known.spindle_speed_rpm,
-            seated=_seated(self.machine, known.workpiece_stiffness),
-            cutting_error=known.cutting_error,
-        )
-        self.advice = replace(found, found_at_rpm=known.spindle_speed_rpm)
-
-
-def _seated(machine: Machine, stiffness: float) -> bool | None:
-    """Whether the bearing carries throughout, or not at all; None in between."""
-    open_ = machine.workpiece_stiffness(seated=False)
-    part = (stiffness - open_) / max(machine.bearing_stiffness, 1e-9 * open_)
-    if abs(part) < _CLEAR_CONTACT:
-        return False
-    return True if abs(part - 1.0) < _CLEAR_CONTACT else None

@@ -6,7 +6,6 @@ Whether a cut is stable is told by its rightmost characteristic root.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -398,33 +397,6 @@ def test_the_margin_is_that_of_the_critical_depth(part: float) -> None:
     seen = _watch(ChatterDetector(), _seconds(lathe, 12.0))
     assert seen[-1].margin == pytest.approx(1.0 / part - 1.0, abs=4.0 * seen[-1].margin_error)
     assert seen[-1].margin_error < 0.3 / part
-
-
-_HZ = 2.0 * np.pi
-
-
-def _told(factor: float) -> Machine:
-    tool = replace(Machine().tool, natural_frequency=factor * Machine().tool.natural_frequency)
-    return replace(Machine(), tool=tool)
-
-
-@pytest.mark.parametrize('factor', [0.9, 0.95, 1.05, 1.1])
-def test_a_machine_told_wrong_is_noticed_and_corrected(factor: float) -> None:
-    detector = ChatterDetector(_told(factor))
-    seen = _watch(detector, _seconds(VirtualLathe(cut=_cut()), 16.0))
-    assert not _flagged(seen)
-    assert 'MISFIT' in {estimate.mode.name for estimate in seen}
-    last = seen[-1]
-    assert last.mode.name == 'CORRECTED'
-    told = factor * Machine().tool.natural_frequency / _HZ
-    assert f'told at {told:.1f} Hz' in last.machine_fit
-    taken = float(last.machine_fit.split('taken at ')[1].split(' ')[0])
-    assert taken == pytest.approx(Machine().tool.natural_frequency / _HZ, rel=0.02)
-
-
-def test_a_machine_told_right_is_believed() -> None:
-    seen = _watch(ChatterDetector(), _seconds(VirtualLathe(cut=_cut()), 16.0))
-    assert {estimate.mode.name for estimate in seen[1:]} == {'FULL'}
 
 
 _BROKEN: dict[str, Callable[[Array], object]] = {

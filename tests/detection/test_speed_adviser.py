@@ -46,6 +46,17 @@ def test_a_speed_comes_from_the_cut_before_the_tool_left_it(seed: int) -> None:
     assert _growth(machine, last.recommended_speed_rpm, deep) < 0.0
 
 
+def test_advice_is_looked_for_when_it_is_asked_for_and_once() -> None:
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=1.1e-3, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    seen = [each for each in _watch(detector, lathe, 1.5) if each.request is not None]
+    last, before = seen[-1], seen[-2]
+    assert last.request is before.request
+    assert 'answer' not in vars(last.request)
+    assert before.advice.speeds
+    assert last.advice is before.advice
+
+
 def test_after_a_speed_that_was_no_cure_another_is_recommended() -> None:
     depth, worse = 1.1e-3, 4300.0
     assert _growth(Machine(), worse, depth) > 0.0

@@ -1,0 +1,149 @@
+"""When a speed is recommended, from which estimate; the answer is found when somebody asks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+from lathe_chatter.detection.speed_advice import ANOTHER_SPEED, Advice, advise, rule_of_thumb
+from lathe_chatter.model import Machine
+
+_ADVISED_AT = (0, 2, 4, 7, 10, 15, 20, 30)
+"""Hops after the alarm, and after a change of speed that was no cure, at which a speed is
+recommended, each time from a better estimate."""
+_CLEAR_CONTACT = 0.15
+"""Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
+_VAGUE = 10.0
+"""Standard error of the growth rate from which on nothing is recommended, 1/s."""
+
+
+class Identified(NamedTuple):
+    """What is known of a cut that chatters.
+
+    Attributes:
+        growth_rate: 1/s.
+        growth_error: Its standard error, 1/s.
+        frequency: Of the chatter, Hz.
+        spindle_speed_rpm: rev/min.
+        cutting_stiffness: C w, N/m; nan without a model.
+        workpiece_stiffness: N/m; nan without a model.
+        cutting_error: Standard error of C w, N/m.
+    """
+
+    growth_rate: float
+    growth_error: float
+    frequency: float
+    spindle_speed_rpm: float
+    cutting_stiffness: float
+    workpiece_stiffness: float
+    cutting_error: float = 0.0
+
+
+@dataclass(frozen=True)
+class AdviceRequest:
+    """A cut that chatters, to which the answer is found when somebody asks, and once.
+
+    Attributes:
+        known: Of the cut.
+        machine: Tool, workpiece and bearing; None where C w was not identified, and the rule
+            60 f_c / k has to do.
+        speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
+    """
+
+    known: Identified
+    machine: Machine | None
+    speed_range: tuple[float, float]
+
+    @cached_property
+    def answer(self) -> Advice:
+        """What to do, some 10 ms after it is asked for first."""
+        known = self.known
+        if self.machine is None:
+            found = rule_of_thumb(known.frequency, self.speed_range)
+        else:
+            found = advise(
+                self.machine,
+                known.cutting_stiffness,
+                self.speed_range,
+                known.spindle_speed_rpm,
+                seated=_seated(self.machine, known.workpiece_stiffness),
+                cutting_error=known.cutting_error,
+            )
+        return replace(found, found_at_rpm=known.spindle_speed_rpm)
+
+
+class SpeedAdviser:
+    """Recommends speeds while there is chatter, and keeps to the estimate that is best.
+
+    Chatter that has grown so far that the tool leaves the cut grows no more, and C w looks less
+    than it is: a speed chosen for it would chatter. So an estimate counts only if it is surer
+    than those before, and its growth rate is not clearly below theirs.
+
+    Args:
+        machine: Tool, workpiece and bearing; None where nothing is known.
+        speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
+
+    Attributes:
+        machine: As given, or as `judge_with` was told.
+        request: For the advice that stands; None where there is none.
+    """
+
+    def __init__(self, machine: Machine | None, speed_range: tuple[float, float]) -> None:
+        """Nothing chatters yet."""
+        self.machine = machine
+        self._speed_range = speed_range
+        self._advised_at = math.nan
+        self.forget()
+
+    def forget(self) -> None:
+        """There is no chatter."""
+        self.request: AdviceRequest | None = None
+        self._error = math.inf
+        self._surely_grew = -math.inf
+
+    def judge_with(self, machine: Machine | None) -> None:
+        """Take another machine: what was recommended stands until there is an estimate with it."""
+        self.machine = machine
+        self._error = math.inf
+        self._surely_grew = -math.inf
+
+    def is_due(self, hops_after_alarm: int) -> bool:
+        """Whether a speed is to be recommended now."""
+        return hops_after_alarm in _ADVISED_AT
+
+    def consider(self, known: Identified, hops_after_alarm: int, *, modelled: bool) -> None:
+        """Recommend from an estimate, if it is better than those before.
+
+        Args:
+            known: The estimate.
+            hops_after_alarm: At 0 there is nothing before.
+            modelled: Whether C w was identified; else the rule 60 f_c / k has to do.
+        """
+        if hops_after_alarm == 0:
+            self.forget()
+        growth, error = known.growth_rate, known.growth_error
+        if growth < -error or error > _VAGUE:
+            return  # it dies down, or nobody knows
+        tried = abs(known.spindle_speed_rpm / self._advised_at - 1.0) > ANOTHER_SPEED
+        if tried and growth < error:
+            return  # what was recommended may yet be the cure
+        self._advised_at = known.spindle_speed_rpm
+        if self.machine is None or not modelled:
+            self.request = AdviceRequest(known, None, self._speed_range)
+            return
+        if not error < self._error or growth + error < self._surely_grew:
+            return
+        self._error = error
+        self._surely_grew = max(self._surely_grew, growth - error)
+        self.request = AdviceRequest(known, self.machine, self._speed_range)
+
+
+def _seated(machine: Machine, stiffness: float) -> bool | None:
+    """Whether the bearing carries throughout, or not at all; None in between."""
+    open_ = machine.workpiece_stiffness(seated=False)
+    part = (stiffness - open_) / max(machine.bearing_stiffness, 1e-9 * open_)
+    if abs(part) < _CLEAR_CONTACT:
+        return False
+    return True if abs(part - 1.0) < _CLEAR_CONTACT else None
