@@ -43,9 +43,13 @@ def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()
 
 
 def given_parameters(options: Namespace) -> dict[str, Any]:
-    """The parameters that were given, by name."""
-    values = {row.name: getattr(options, row.name, None) for row in LATHE}
-    return {name: value for name, value in values.items() if value is not None}
+    """The parameters that were given, by name.
+
+    Raises:
+        ParameterError: If a value is not allowed.
+    """
+    values = {row: getattr(options, row.name, None) for row in LATHE}
+    return {row.name: row.check(value) for row, value in values.items() if value is not None}
 
 
 def config_of(options: Namespace) -> LatheConfig:

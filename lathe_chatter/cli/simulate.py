@@ -13,6 +13,7 @@ from lathe_chatter.cli.parameter_options import add_parameter_options, given_par
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
 from lathe_chatter.errors import ParameterError, ScenarioError
+from lathe_chatter.lathe.config import config_from
 from lathe_chatter.lathe.cut_event_sentences import Knock
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model.quantity_fields import Quantity
@@ -107,7 +108,9 @@ def _scenario(options: Namespace) -> Scenario:
             f'The scenario {scenario.name} has a supervisor, which takes real nodes: play it with '
             '`lathe-chatter run`.'
         )
-    return replace(scenario, parameters={**scenario.parameters, **given_parameters(options)})
+    parameters = {**scenario.parameters, **given_parameters(options)}
+    config_from(parameters)  # or says what is wrong, before anything is compiled
+    return replace(scenario, parameters=parameters)
 
 
 def _knock(text: str, duration: float) -> Knock:

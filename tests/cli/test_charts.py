@@ -102,7 +102,7 @@ def test_a_machine_without_a_limit_has_a_chart_too(
     [
         (['lobes', '--from', '0'], '--from is 0.0 rev/min: it must be'),
         (['lobes', '--from', '4000', '--to', '3000'], 'above --from'),
-        (['lobes', '--depth-of-cut', 'deep'], "depth_of_cut is 'deep' m"),
+        (['lobes', '--depth-of-cut', 'deep'], "depth_of_cut is 'deep': it must be"),
         (['lobes', '--tool.mass', '0'], 'tool.mass is 0 kg'),
         (['lobes', '--output', '/dev/null/all.png'], 'cannot be'),
         (['lobes', '--output', 'chart.xyz'], 'a file that ends in .png, .svg or .pdf'),
