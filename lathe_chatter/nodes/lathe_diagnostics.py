@@ -150,12 +150,12 @@ class TickStatistics:
     def _verdict(
         self, control: RunControl, asked: float, late: float, clock: str
     ) -> tuple[bytes, str]:
-        """Level and message of the pace: what is wrong first."""
+        """Level and message of the pace: what is wrong, a cause before what comes of it."""
         running = control.state is RunState.RUNNING
         wrong = (
             (bool(clock), clock),
-            (self.behind, 'behind: simulated time was given up'),
             (self.requests_share > FLOOD, 'flooded: requests take much of the time'),
+            (self.behind, 'behind: simulated time was given up'),
             (running and late > _LATE, 'catching up'),
         )
         for holds, message in wrong:
