@@ -97,7 +97,7 @@ def calls(file: Path, name: str) -> list[dict[str, str]]:
 
 def test_the_page_has_every_argument_of_every_file() -> None:
     page = (ROOT / 'docs' / 'how_to' / 'launch.md').read_text(encoding='utf-8')
-    parts = re.split(r'^### `(\w+)\.launch\.py`$', page, flags=re.MULTILINE)
+    parts = re.split(r'^## `(\w+)\.launch\.py`$', page, flags=re.MULTILINE)
     described = {
         name: dict(re.findall(r'^\| `(\w+)` \| (.*?) \|', text, re.MULTILINE))
         for name, text in zip(parts[1::2], parts[2::2], strict=True)

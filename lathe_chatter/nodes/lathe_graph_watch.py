@@ -69,9 +69,16 @@ class PublisherWatch:
                 'publishers',
             )
 
-    def status(self, readers: int) -> Status:
-        """Whether the samples on the topic are all of this node."""
-        values = {'publishers': ', '.join(self._names), 'readers': readers}
+    def status(self, readers: int, zero: int | None) -> Status:
+        """Whether the samples on the topic are all of this node.
+
+        Args:
+            readers: How many read them.
+            zero: What /clock shows at their time 0, ns, where it is followed.
+        """
+        values: dict[str, object] = {'publishers': ', '.join(self._names), 'readers': readers}
+        if zero is not None:
+            values['time 0 on /clock, s'] = zero / SECOND
         if len(self._names) > 1:
             return Status('samples', WARN, 'not the only lathe on the topic', values)
         return Status('samples', OK, 'published', values)

@@ -375,7 +375,7 @@ class LatheNode(ParameterNode):
                 scheduling=self._real_time.word,
             ),
             self._meter.cutting(self._control, self._lathe),
-            self._others.status(self._topics.readers()),
+            self._others.status(self._topics.readers(), self._topics.zero),
             *self._record.statuses(),
         ]
 

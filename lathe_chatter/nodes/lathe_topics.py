@@ -51,7 +51,7 @@ class LatheTopics:
         publish_clock: Whether /clock is among them.
 
     Attributes:
-        zero: What /clock shows at time 0 of the samples, ns, where it is followed.
+        zero: What /clock shows at time 0 of the samples, ns; None where it is not followed.
     """
 
     def __init__(
@@ -75,7 +75,8 @@ class LatheTopics:
         # Without a /clock nobody knows simulated time: stamps are the node's then.
         self._follows = bool(node.get_parameter('use_sim_time').value)
         self._now = None if publish_clock or self._follows else node.get_clock().now
-        self._log, self.zero = BoundedLog(QuickLog(node.get_logger())), 0
+        self._log = BoundedLog(QuickLog(node.get_logger()))
+        self.zero: int | None = None
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
         self._looked_around = -_LOOK_AROUND
@@ -104,7 +105,7 @@ class LatheTopics:
 
     def _follow(self, zero: int) -> None:
         """Say where the samples are on another's /clock, ns, whenever that is new."""
-        if abs(zero - self.zero) > _SAME:
+        if self.zero is None or abs(zero - self.zero) > _SAME:
             self.zero = zero
             said = f'Time 0 of the samples is {zero / 1e9:.6f} s of /clock.'
             self._log.info(said, 'clock')

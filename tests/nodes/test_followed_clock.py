@@ -117,6 +117,14 @@ def test_where_the_samples_are_on_the_clock_is_told_at_each_jump(
     clock.said('Time 0 of the samples is 100.0')
     clock.said('Time 0 of the samples is 49.')
     told = [float(each.split()[6]) for each in clock.said('Time 0 of the samples')]
+    bench.spin_until(
+        lambda: any(
+            value.key == 'time 0 on /clock, s' and abs(float(value.value) - told[-1]) < 2e-6
+            for status in clock.diagnostics[-1].status
+            for value in status.values
+        ),
+        'the same in /diagnostics',
+    )
     time, place = (SAMPLE_COLUMNS.index(name) for name in ('time', 'tool_displacement'))
     width = len(SAMPLE_COLUMNS)
     ends = {block.data[place - width]: block.data[time - width] for block in blocks}
