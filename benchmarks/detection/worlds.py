@@ -24,7 +24,7 @@ from lathe_chatter.stability import critical_depth, rightmost_root
 
 _NODE = 0.02
 """s of samples at once, as the node gets them."""
-_UNTUNED = 20_000
+_UNTUNED = 40_000
 """Where the seeds that are reported begin: nothing was tuned on them."""
 _HERTZ_AFTER = 0.1
 """s after the flag at which its frequency is looked at."""
