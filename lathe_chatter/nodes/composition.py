@@ -19,6 +19,8 @@ from lathe_chatter.errors import RecordingFailedError
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.node_main import make_executor, run_node
+from lathe_chatter.nodes.node_parameters import LATHE, MONITOR, RECORDER
+from lathe_chatter.nodes.parameter_arguments import Own
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.real_time_loop import Served, ask_for_short_slices, spin_together
 from lathe_chatter.nodes.recorder_node import RecorderNode
@@ -27,8 +29,11 @@ USAGE = """usage: cell [--ros-args -p NODE:PARAMETER:=VALUE ...]
 
 The nodes lathe, chatter_monitor and run_recorder in one process, for instance
   cell --ros-args -p lathe:depth_of_cut:=0.001 -p run_recorder:output:=runs/today
+NODE is the same in a namespace (-r __ns:=/cell1), or what the node is remapped to. A parameter
+without NODE goes to each node that has it; one that reaches nobody keeps the cell from starting.
 `lathe --help`, `chatter_monitor --help` and `run_recorder --help` list their parameters."""
 
+MEMBERS = {'lathe': LATHE, 'chatter_monitor': MONITOR, 'run_recorder': RECORDER}
 _SERVE_PERIOD = 50_000_000
 """ns from one look for requests to monitor and recorder to the next."""
 
@@ -50,22 +55,23 @@ class Cell:
     """Three nodes that begin, finish and go together, as `run_node` wants it of one.
 
     Args:
+        own: The `cli_args` of each by its name, see `deal_parameters`.
         options: As for `rclpy.node.Node`, for each of them.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, own: Own, **options: Any) -> None:
         """Make them, those first that listen."""
         self._nodes: list[ParameterNode] = []
         try:
-            self.recorder = self._add(_CellRecorder, options)
-            self.monitor = self._add(MonitorNode, options)
-            self.lathe = self._add(LatheNode, options)
+            self.recorder = self._add(_CellRecorder, own['run_recorder'], options)
+            self.monitor = self._add(MonitorNode, own['chatter_monitor'], options)
+            self.lathe = self._add(LatheNode, own['lathe'], options)
         except BaseException:
             self.destroy_node()
             raise
 
-    def _add(self, kind: Callable[..., Any], options: dict[str, Any]) -> Any:
-        node = kind(by_timer=False, **options)
+    def _add(self, kind: Callable[..., Any], own: list[str], options: dict[str, Any]) -> Any:
+        node = kind(by_timer=False, cli_args=own, **options)
         self._nodes.append(node)
         return node
 
@@ -114,10 +120,13 @@ def main() -> None:
     ask_for_short_slices()
     cells: list[Cell] = []
 
-    def make() -> Cell:
-        cells.append(Cell())
+    def make(own: Own) -> Cell:
+        cells.append(Cell(own))
         return cells[0]
 
-    run_node(make, spin=lambda executor, cell, ended: cell.spin(executor, ended), usage=USAGE)
+    def spin(executor: Executor, cell: Cell, ended: Callable[[], bool]) -> None:
+        cell.spin(executor, ended)
+
+    run_node(make, MEMBERS, spin=spin, usage=USAGE)
     if cells and cells[0].recorder.failed:
         raise SystemExit(1)

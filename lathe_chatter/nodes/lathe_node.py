@@ -394,4 +394,8 @@ class LatheNode(ParameterNode):
 def main() -> None:
     """Run the node until it is told to end."""
     ask_for_short_slices()
-    run_node(lambda: LatheNode(by_timer=False), spin=spin_in_ticks, usage=LATHE.usage('lathe'))
+    run_node(
+        lambda own: LatheNode(by_timer=False, cli_args=own['lathe']),
+        {'lathe': LATHE},
+        spin=spin_in_ticks,
+    )

@@ -369,8 +369,8 @@ def main() -> None:
     # The executor driven by events would take the samples away.
     spin = partial(spin_in_ticks, serve_period=_SERVE_PERIOD)
     run_node(
-        lambda: MonitorNode(by_timer=False),
+        lambda own: MonitorNode(by_timer=False, cli_args=own['chatter_monitor']),
+        {'chatter_monitor': MONITOR},
         by_events=False,
         spin=spin,
-        usage=MONITOR.usage('chatter_monitor'),
     )

@@ -16,6 +16,7 @@ from rclpy.executors import (
     ExternalShutdownException,
     SingleThreadedExecutor,
 )
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos_overriding_options import InvalidQosOverridesError
 from rclpy.signals import SignalHandlerOptions
@@ -28,6 +29,7 @@ from lathe_chatter.nodes.end_signals import (
     raise_on_end_signals,
 )
 from lathe_chatter.nodes.log_folder import ensure_log_folder
+from lathe_chatter.nodes.parameter_arguments import Members, Own, deal_parameters
 from lathe_chatter.nodes.real_time_loop import LOOK_UP
 
 try:
@@ -84,8 +86,8 @@ _START_ERRORS = (
 
 
 def run_node(
-    make: Callable[[], _Node],
-    args: list[str] | None = None,
+    make: Callable[[Own], _Node],
+    members: Members,
     *,
     by_events: bool = True,
     spin: Spin[_Node] | None = None,
@@ -97,11 +99,11 @@ def run_node(
     process ends all the same, for this is the last that it does.
 
     Args:
-        make: Makes the node once rclpy is initialised.
-        args: Command-line arguments, those of the process by default.
+        make: Makes the node once rclpy is initialised, with what is given to each member alone.
+        members: The nodes by name, each with the table of its parameters.
         by_events: Whether the executor may be the one driven by events; see `make_executor`.
         spin: How the node is served until it is told to end; by default as `serve` does.
-        usage: What `--help` prints.
+        usage: What `--help` prints; by default the table of the one node.
 
     Raises:
         SystemExit: With 0 after `--help`; with 2 and a sentence on stderr if the node cannot
@@ -112,11 +114,14 @@ def run_node(
     begun = False
     try:
         came = raise_on_end_signals()
-        _refuse_words(sys.argv if args is None else ['', *args], usage)
+        args, own, missed = deal_parameters(sys.argv, members)
+        _refuse_words(args, usage or _usage(members))
         if logs := ensure_log_folder():
             sys.stderr.write(f'{logs}\n')
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = make()
+        for sentence in missed:
+            get_logger(next(iter(members))).warning(sentence)
+        node = make(own)
         # rclpy's own handlers would shut the context down under a callback that is publishing,
         # and the node could say nothing more at its end.
         with DeferredSignals() as signals:
@@ -135,6 +140,11 @@ def run_node(
     finally:
         ignore_end_signals()
         _finish(node)
+
+
+def _usage(members: Members) -> str:
+    ((name, table),) = members.items()
+    return table.usage(name)
 
 
 def _refuse_words(args: list[str], usage: str) -> None:

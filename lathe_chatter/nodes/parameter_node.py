@@ -18,11 +18,10 @@ from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import ParameterError, UnknownParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
+from lathe_chatter.nodes.parameter_arguments import OF_QOS, OF_RCLPY
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 from lathe_chatter.nodes.real_time_loop import RequestLoad
 
-_OF_RCLPY = ('use_sim_time', 'start_type_description_service')
-_OF_QOS = 'qos_overrides.'
 _SET_SERVICES = (SetParameters, SetParametersAtomically)
 
 
@@ -150,11 +149,11 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         if not isinstance(overrides['use_sim_time'].value, bool):
             value = overrides['use_sim_time'].value
             raise ParameterError('use_sim_time', value, '', 'true or false')
-        for name in _OF_RCLPY:
+        for name in OF_RCLPY:
             overrides.pop(name, None)
         for name in overrides:
             self.undeclare_parameter(name)
-            if name not in self._table and not name.startswith(_OF_QOS):
+            if name not in self._table and not name.startswith(OF_QOS):
                 if self._table.nearest(name):
                     raise UnknownParameterError(self._table.unknown(name))
                 # As from a file of parameters for all nodes of a system.
@@ -180,7 +179,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         """Why a set would be refused, as a sentence; empty where it is accepted."""
         for parameter in parameters:
             name = parameter.name
-            if name in _OF_RCLPY:
+            if name in OF_RCLPY:
                 return f'{name} can be given at the start only.'
             if name not in self._table:
                 if self.has_parameter(name):

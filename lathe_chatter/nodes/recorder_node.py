@@ -389,10 +389,10 @@ def main() -> None:
     try:
         # The executor driven by events would call for each message.
         run_node(
-            lambda: RecorderNode(by_timer=False),
+            lambda own: RecorderNode(by_timer=False, cli_args=own['run_recorder']),
+            {'run_recorder': RECORDER},
             by_events=False,
             spin=partial(spin_in_ticks, serve_period=_SERVE_PERIOD),
-            usage=RECORDER.usage('run_recorder'),
         )
     except RecordingFailedError as error:
         sys.stderr.write(f'{error}\n')

@@ -309,4 +309,5 @@ def _limits_of(values: Mapping[str, Any]) -> Limits:
 
 def main() -> None:
     """Run the node until it is told to end."""
-    run_node(SupervisorNode, usage=SUPERVISOR.usage('chatter_supervisor'))
+    name = 'chatter_supervisor'
+    run_node(lambda own: SupervisorNode(cli_args=own[name]), {name: SUPERVISOR})
