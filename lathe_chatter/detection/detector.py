@@ -134,8 +134,18 @@ class ChatterDetector:
             return replace(self._estimate, mode=Mode.BLIND)
         return self._estimate
 
-    def set_machine(self, machine: Machine | None, *, first: bool = False) -> None:
+    def set_machine(
+        self,
+        machine: Machine | None,
+        speed_range: tuple[float, float] | None = None,
+        *,
+        first: bool = False,
+    ) -> None:
         """Judge with another machine from the next samples on; an alarm stays."""
+        if speed_range is not None:
+            self._speed_range = speed_range
+            for adviser in self._advisers:
+                adviser.speed_range = speed_range
         self._told = machine
         self._machine = machine if _has_single_modes(machine) else None
         self._correction: tuple[float, float] | None = None

@@ -93,7 +93,7 @@ class SpeedAdviser:
     def __init__(self, machine: Machine | None, speed_range: tuple[float, float]) -> None:
         """Nothing chatters yet."""
         self.machine = machine
-        self._speed_range = speed_range
+        self.speed_range = speed_range
         self._advised_at = math.nan
         self.forget()
 
@@ -131,13 +131,13 @@ class SpeedAdviser:
             return  # what was recommended may yet be the cure
         self._advised_at = known.spindle_speed_rpm
         if self.machine is None or not modelled:
-            self.request = AdviceRequest(known, None, self._speed_range)
+            self.request = AdviceRequest(known, None, self.speed_range)
             return
         if not error < self._error or growth + error < self._surely_grew:
             return
         self._error = error
         self._surely_grew = max(self._surely_grew, growth - error)
-        self.request = AdviceRequest(known, self.machine, self._speed_range)
+        self.request = AdviceRequest(known, self.machine, self.speed_range)
 
 
 def _seated(machine: Machine, stiffness: float) -> bool | None:

@@ -95,6 +95,22 @@ def described_by(values: Mapping[str, Any]) -> MachineDescription | None:
     return load_machine(source) if source else None
 
 
+def feed_refusal(given: Mapping[str, Any], present: Mapping[str, Any]) -> str:
+    """Why a change of the feed would have no effect, a sentence; empty where it has one.
+
+    Args:
+        given: What changes together.
+        present: What holds until then, `feed_speed` and `feed_per_revolution` at least.
+    """
+    feed, speed = present['feed_per_revolution'], given.get('feed_speed')
+    if not feed or speed in {None, present['feed_speed']} or 'feed_per_revolution' in given:
+        return ''
+    return (
+        f'feed_speed is {speed:g} m/s, and feed_per_revolution, {feed:g} m, rules: give '
+        'feed_per_revolution 0 with it, or another one.'
+    )
+
+
 class HasParameters(Protocol):
     """A lathe, or how one is started."""
 

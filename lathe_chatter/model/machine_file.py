@@ -94,6 +94,17 @@ class MachineDescription:
         found = self.slowest_speed, self.fastest_speed
         return None if found == (_SPEED.low, _SPEED.high) else found
 
+    def speed_doubt(self, cut: Cut) -> str:
+        """That the spindle does not turn as a cut wants it to, a sentence; else empty."""
+        swing = cut.spindle_speed_rpm * cut.speed_variation_amplitude
+        slow, fast = cut.spindle_speed_rpm - swing, cut.spindle_speed_rpm + swing
+        if self.slowest_speed <= slow and fast <= self.fastest_speed:
+            return ''
+        return (
+            'The spindle turns outside of what the machine file says it can, '
+            f'{self.slowest_speed:g} to {self.fastest_speed:g} rev/min.'
+        )
+
     def text(self) -> str:
         """The same as one line of JSON, which `load_machine` takes: to the last bit."""
         return json.dumps(self.sections())
@@ -146,6 +157,15 @@ def _described(mode: Mode) -> dict[str, Any]:
     parts = {name: getattr(mode, name) for name in _PARTS}
     found = {'frequency': frequency, 'damping_ratio': mode.damping_ratio, 'mass': mode.mass}
     return found | {name: value for name, value in parts.items() if value != 1.0}
+
+
+def narrowed(
+    speeds: tuple[float, float], spindle: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """The speeds, rev/min, of a range that a spindle has too; None where there are none."""
+    slowest, fastest = spindle or speeds
+    slowest, fastest = max(speeds[0], slowest), min(speeds[1], fastest)
+    return (slowest, fastest) if slowest < fastest else None
 
 
 def shipped_machines() -> dict[str, Path]:

@@ -17,6 +17,8 @@ _MICRO = 1e-3
 _LATEST = 4096
 FLOOD = 0.25
 """Fraction of the time that requests take when they are called a flood."""
+_FEW = 1
+"""Requests in a second that are none yet, however long they take: a reset takes long by itself."""
 _LATE = 0.1
 """s behind the clock from which a node no longer keeps up."""
 
@@ -107,6 +109,11 @@ class TickStatistics:
         return (self._requests.taken - self._before.taken) / elapsed
 
     @property
+    def flooded(self) -> bool:
+        """Whether many requests took much of the time in this second."""
+        return self.requests_share > FLOOD and self.requests_served > _FEW
+
+    @property
     def requests_served(self) -> int:
         """How many requests were served in this second."""
         return self._requests.served - self._before.served
@@ -154,7 +161,7 @@ class TickStatistics:
         running = control.state is RunState.RUNNING
         wrong = (
             (bool(clock), clock),
-            (self.requests_share > FLOOD, 'flooded: requests take much of the time'),
+            (self.flooded, 'flooded: requests take much of the time'),
             (self.behind, 'behind: simulated time was given up'),
             (running and late > _LATE, 'catching up'),
         )

@@ -19,30 +19,40 @@ class ClockWatch:
     """Says when a /clock stands still, and when it goes on.
 
     Args:
-        log: Of the node.
-
-    Attributes:
-        stands: Whether it stands still.
+        node: The lathe.
+        log: Of it.
+        follows: Whether it cuts the time of /clock.
+        drives: Whether it publishes it.
     """
 
-    def __init__(self, log: BoundedLog) -> None:
+    def __init__(self, node: Node, log: BoundedLog, *, follows: bool, drives: bool) -> None:
         """Nothing is seen yet."""
-        self._log, self.stands = log, False
+        self._node, self._log, self._follows, self._drives = node, log, follows, drives
+        self._stands = False
         self._shown, self._since = 0, 0.0
 
     def look(self, now: int) -> None:
         """Look at the time that it shows, ns; called once a second."""
-        at, before = time.monotonic(), self.stands
+        at, before = time.monotonic(), self._stands
         if now != self._shown:
             self._shown, self._since = now, at
-        self.stands = bool(now) and at - self._since >= _CLOCK_STOPPED
-        if self.stands and not before:
+        self._stands = bool(now) and at - self._since >= _CLOCK_STOPPED
+        if self._stands and not before:
             self._log.warning(
                 f'/clock stands still at {now / SECOND:.3f} s, and the cut with it.',
                 'clock stands',
             )
-        elif before and not self.stands:
+        elif before and not self._stands:
             self._log.info(f'/clock goes on at {now / SECOND:.3f} s.', 'clock goes on')
+
+    def complaint(self, now: int) -> str:
+        """What is wrong with it, where the node drives or follows it; `now` is its time, ns."""
+        owners = self._node.count_publishers('/clock')
+        if self._follows and not (owners and now):
+            return 'waiting for /clock'
+        if (self._follows or self._drives) and owners > 1:
+            return f'{owners} nodes publish /clock: it must have one owner'
+        return '/clock stands still' if self._stands else ''
 
 
 class PublisherWatch:

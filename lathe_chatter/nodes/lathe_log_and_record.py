@@ -55,6 +55,7 @@ class LatheRecord:
         self._log(BEGINNING)
         config = recorded_config(values)
         self._setup, self._doubts = config.setup, list[str]()
+        self._described, self._speed_doubt = config.described, ''
         self._doubt(config.cut)
 
     def write(self, samples: Array) -> None:
@@ -97,7 +98,15 @@ class LatheRecord:
             self._run = None
 
     def _doubt(self, cut: Cut) -> None:
-        """Say why the samples may not be what was meant; each sentence once."""
+        """Say why the samples may not be what was meant; each sentence once.
+
+        That the spindle turns too fast or too slowly is said each time that it begins to.
+        """
+        before, self._speed_doubt = self._speed_doubt, ''
+        if self._described is not None:
+            self._speed_doubt = self._described.speed_doubt(cut)
+        if self._speed_doubt and not before:
+            self._logger.warning(self._speed_doubt)
         for sentence in doubts(self._setup, cut):
             if sentence not in self._doubts:
                 self._doubts.append(sentence)

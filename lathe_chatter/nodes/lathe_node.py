@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
@@ -15,12 +16,18 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE, cut_from, samples_per_tick
+from lathe_chatter.model.lathe_parameter_table import (
+    CUT_ROWS,
+    LATHE,
+    cut_from,
+    feed_refusal,
+    samples_per_tick,
+)
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes import simulation_control, simulation_services
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.joint_states import nanoseconds
-from lathe_chatter.nodes.lathe_diagnostics import FLOOD, TickStatistics
+from lathe_chatter.nodes.lathe_diagnostics import TickStatistics
 from lathe_chatter.nodes.lathe_graph_watch import ClockWatch, PublisherWatch
 from lathe_chatter.nodes.lathe_log_and_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
@@ -97,7 +104,8 @@ class LatheNode(ParameterNode):
         self._free = self._factor == 0.0
         self._wait_until = 0
         self._others = PublisherWatch(self, self._log)
-        self._clock_watch = ClockWatch(self._log)
+        drives: bool = values['publish_clock']
+        self._clock_watch = ClockWatch(self, self._log, follows=self._follows, drives=drives)
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
@@ -253,6 +261,11 @@ class LatheNode(ParameterNode):
 
     # -- the cut ---------------------------------------------------------------------------
 
+    def _refusal(self, parameters: list[Parameter]) -> str:
+        """Also of a feed speed that would have no effect."""
+        given = dict.fromkeys(self.set_together) | {p.name: p.value for p in parameters}
+        return super()._refusal(parameters) or feed_refusal(given, self.values)
+
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Queue the new cut for the next tick, or take the new pace at once."""
         if 'real_time_factor' in changed and not self._follows:
@@ -350,13 +363,10 @@ class LatheNode(ParameterNode):
         if self._follows:
             self._clock_watch.look(self._now())
         self._others.look()
-        share = self._meter.requests_share
-        if share > FLOOD:
-            self._log.warning(
-                f'Requests take {share:.0%} of the time: {self._meter.requests_served} in the '
-                'last second.',
-                'flood',
-            )
+        if self._meter.flooded:
+            share, served = self._meter.requests_share, self._meter.requests_served
+            said = f'Requests take {share:.0%} of the time: {served} in the last second.'
+            self._log.warning(said, 'flood')
         self._diagnostics.publish(self._statuses())
         self._log.look()
         self._meter.begin_second()
@@ -371,24 +381,13 @@ class LatheNode(ParameterNode):
                 self._control,
                 asked=self._factor,
                 late=max(late, 0.0) / SECOND,
-                clock=self._clock_complaint(),
+                clock=self._clock_watch.complaint(self._now()),
                 scheduling=self._real_time.word,
             ),
             self._meter.cutting(self._control, self._lathe),
             self._others.status(self._topics.readers(), self._topics.zero),
             *self._record.statuses(),
         ]
-
-    def _clock_complaint(self) -> str:
-        """What is wrong with /clock, where this node drives or follows it."""
-        owners = self.count_publishers('/clock')
-        if self._follows and not (owners and self._now()):
-            return 'waiting for /clock'
-        if (self._follows or self.values['publish_clock']) and owners > 1:
-            return f'{owners} nodes publish /clock: it must have one owner'
-        if self._clock_watch.stands:
-            return '/clock stands still'
-        return ''
 
 
 def main() -> None:

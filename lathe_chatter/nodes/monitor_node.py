@@ -19,6 +19,7 @@ from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.lathe_parameter_table import machine_from
+from lathe_chatter.model.machine_file import MachineDescription, narrowed
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.monitor_sentences import (
@@ -90,6 +91,7 @@ class MonitorNode(ParameterNode):
         self._asked: RemoteMachine | None = None
         if source is ModelSource.LATHE:
             self._asked = RemoteMachine(self, self._learn)
+        self._speed_range = self._own_speeds()
         self._detector = self._new_detector()
         self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
@@ -222,18 +224,26 @@ class MonitorNode(ParameterNode):
             self._senders = []
             self._continuity.last = None
 
-    def _learn(self, machine: Machine) -> None:
-        """Take the machine that the lathe says it is."""
-        if machine != self.machine:
-            self.machine = machine
-            self._say('machine', 'The lathe has told what machine it is.')
-            self._detector.set_machine(machine)
+    def _learn(self, machine: Machine, file: MachineDescription | None) -> None:
+        """Take the machine that the lathe says it is, with the speeds that its spindle has."""
+        speeds = self._own_speeds()
+        if file is not None:
+            speeds = narrowed(speeds, file.speed_range) or (file.slowest_speed, file.fastest_speed)
+        if (machine, speeds) != (self.machine, self._speed_range):
+            self.machine, self._speed_range = machine, speeds
+            turns = f', with speeds from {speeds[0]:g} to {speeds[1]:g} rev/min' if file else ''
+            self._say('machine', f'The lathe has told what machine it is{turns}.')
+            self._detector.set_machine(machine, speeds)
+
+    def _own_speeds(self) -> tuple[float, float]:
+        numbers: Mapping[str, Any] = self.values
+        return numbers['slowest_speed'], numbers['fastest_speed']
 
     def _new_detector(self) -> ChatterDetector:
         numbers = {name: value for name, value in self.values.items() if isinstance(value, float)}
         return ChatterDetector(
             self.machine,
-            speed_range=(numbers['slowest_speed'], numbers['fastest_speed']),
+            speed_range=self._speed_range,
             lowest_frequency=numbers['lowest_frequency'],
             highest_frequency=numbers['highest_frequency'],
             nominal_rpm=numbers['spindle_speed_rpm'],

@@ -65,7 +65,7 @@ SENTENCES = {
     ),
     'machine': Sentence(
         'info',
-        r'The lathe has told what machine it is\.',
+        r'The lathe has told what machine it is(, with speeds from .+ rev/min)?\.',
         'the parameters of the lathe came, and are another machine than before',
     ),
     'sensors': Sentence(

@@ -33,6 +33,11 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         table: Its parameters.
         options: As for `rclpy.node.Node`.
 
+    Attributes:
+        requests: What serving them takes.
+        set_together: Names in the request that is being served, as of a dump that is loaded:
+            rclpy sets them one by one.
+
     Raises:
         ParameterError: If an override is not allowed; the sentence names it.
         UnknownParameterError: If a name is nearly that of a parameter; the sentence says which.
@@ -44,6 +49,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         # unit nor limits. Declared from the overrides first, without type or range, they can be
         # read, checked by the table, and declared again as the table has them.
         self.requests = RequestLoad()
+        self.set_together: frozenset[str] = frozenset()
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
         if hasattr(self.context, 'untrack_node'):
             # From Kilted on a context ends its nodes, one too whose making was given up half-way.
@@ -132,7 +138,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         other wrong value.
         """
         if srv_type in _SET_SERVICES:
-            callback = _without_unknown_types(callback)
+            callback = self._noting_names(_without_unknown_types(callback))
 
         def serve(request: Any, response: Any) -> Any:
             began = time.monotonic_ns()
@@ -142,6 +148,16 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                 self.requests.note(began)
 
         return super().create_service(srv_type, srv_name, serve, **options)
+
+    def _noting_names(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        def answer(request: Any, response: Any) -> Any:
+            self.set_together = frozenset(entry.name for entry in request.parameters)
+            try:
+                return callback(request, response)
+            finally:
+                self.set_together = frozenset()
+
+        return answer
 
     def _take_overrides(self) -> dict[str, object]:
         """Undeclare everything that the overrides declared, and return it."""

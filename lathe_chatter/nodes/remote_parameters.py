@@ -13,7 +13,13 @@ from rclpy.parameter import parameter_value_to_python
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE, MACHINE_ROWS, machine_from
+from lathe_chatter.model.lathe_parameter_table import (
+    MACHINE_FILE,
+    MACHINE_ROWS,
+    described_by,
+    machine_from,
+)
+from lathe_chatter.model.machine_file import MachineDescription
 
 _SETTLING = 1.0
 """s from when this node has found the services of another to when the other has found it too: an
@@ -24,6 +30,7 @@ _PATIENCE = 1.0
 """s after which an unanswered node is asked again: on a busy machine answers may be lost."""
 _MACHINE = [MACHINE_FILE.name, *(row.name for row in MACHINE_ROWS)]
 
+OnMachine = Callable[[Machine, MachineDescription | None], None]
 Answer = Callable[[str, dict[str, Any]], None]
 """Takes the name of a node and its parameters; one that it does not have is None."""
 
@@ -143,10 +150,10 @@ class RemoteMachine:
 
     Args:
         node: That asks; the lathe is the node `lathe` beside it, remappable like its topics.
-        on_machine: Called with the machine.
+        on_machine: Called with the machine, and with its file where it has one.
     """
 
-    def __init__(self, node: Node, on_machine: Callable[[Machine], None]) -> None:
+    def __init__(self, node: Node, on_machine: OnMachine) -> None:
         """Nothing is asked yet."""
         self._node, self._on_machine = node, on_machine
         self._parameters = RemoteParameters(node, self._take)
@@ -164,7 +171,7 @@ class RemoteMachine:
         described = bool(known.get(MACHINE_FILE.name))
         lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in known]
         try:
-            machine = machine_from(known)
+            machine, file = machine_from(known), described_by(known)
         except LatheChatterError as error:
             self._complain(str(error))
         else:
@@ -172,7 +179,7 @@ class RemoteMachine:
                 self._complain(f'it has no parameter {lacking[0]}.')
                 return
             self.answered = True
-            self._on_machine(machine)
+            self._on_machine(machine, file)
 
     def _complain(self, reason: str) -> None:
         self._node.get_logger().error(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,7 +21,8 @@ from std_srvs.srv import SetBool, Trigger
 from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameter_table import cut_from, machine_from
+from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
+from lathe_chatter.model.machine_file import narrowed
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
@@ -64,7 +66,6 @@ class SupervisorNode(ParameterNode):
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
         # Compiled or loaded before there is any hurry.
         list(moves_for(may_be(Machine(), 0.01), Cut(), Limits()))
-        self._core = self._new_core()
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
         self._chatter, self._state = False, ''
         self._heard_at = self._lost_at = -math.inf
@@ -75,6 +76,7 @@ class SupervisorNode(ParameterNode):
         self._sent: dict[str, Any] = {}
         self._cut: Cut | None = None
         self._machine: Machine | None = None
+        self._no_speed = ''
         self._answer: tuple[Any, float] | None = None
         self._newest = 'nothing was done yet'
         self._set = self.create_client(SetParametersAtomically, 'lathe/set_parameters_atomically')
@@ -83,6 +85,7 @@ class SupervisorNode(ParameterNode):
             self.resolve_service_name(f'{name}/get_parameters').rpartition('/')[0]
             for name in ('lathe', 'chatter_monitor')
         )
+        self._core = self._new_core()
         self._remote = RemoteParameters(self, self._take_parameters)
         for name in _FIGURES:
             take = partial(self._on_figure, name)
@@ -119,9 +122,27 @@ class SupervisorNode(ParameterNode):
         values: Mapping[str, Any] = self.values
         names = ('machine_error', 'margin_limit', 'move_early', 'hands_off')
         options = {name: values[name] for name in names}
-        core = Supervisor(_limits_of(values), Mode(values['mode']), **options)
+        core = Supervisor(self._limits(), Mode(values['mode']), **options)
         core.hand_moved(time.monotonic())
         return core
+
+    def _limits(self) -> Limits:
+        """Its own, and those of the spindle as far as the lathe's or the monitor's machine tells.
+
+        Raises:
+            LatheChatterError: If that machine is none.
+        """
+        limits, self._no_speed = _limits_of(self.values), ''
+        for name in (self._lathe, self._monitor):
+            file = described_by(self._told.get(name, {}))
+            if file is None or file.speed_range is None:
+                continue
+            speeds = narrowed((limits.slowest_speed, limits.fastest_speed), file.speed_range)
+            if speeds is None:
+                self._no_speed = 'the spindle has no speed from slowest_speed to fastest_speed'
+                return limits
+            return replace(limits, slowest_speed=speeds[0], fastest_speed=speeds[1])
+        return limits
 
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Begin anew with what was set."""
@@ -184,6 +205,7 @@ class SupervisorNode(ParameterNode):
         try:
             if name == self._lathe:
                 self._take_changes(self._told[name])
+            self._core.limits = self._limits()
             if told and source != ModelSource.NONE.value:
                 self._machine = machine_from(told)
         except LatheChatterError as error:
@@ -220,7 +242,9 @@ class SupervisorNode(ParameterNode):
             return 'samples were lost'
         if self.count_publishers('~/action') > 1:
             return 'there is another supervisor'
-        return '' if self._set.service_is_ready() else 'the lathe cannot be reached'
+        if not self._set.service_is_ready():
+            return 'the lathe cannot be reached'
+        return self._no_speed
 
     def _look(self) -> None:
         if self._answer is not None:

@@ -6,6 +6,7 @@ A scenario is a YAML file; config/scenarios/ holds two with every key explained.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from lathe_chatter.errors import (
     nearest_name,
     reason_of,
 )
-from lathe_chatter.model.lathe_parameter_table import LATHE, MACHINE_FILE
+from lathe_chatter.model.lathe_parameter_table import LATHE, MACHINE_FILE, cut_from, feed_refusal
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.shipped_files import shipped_files
@@ -70,6 +71,9 @@ class Scenario:
         steps: The changes, in order.
         supervisor: Parameters of a node `chatter_supervisor` that plays too; None without one.
         expect: What the monitor should have said at the end: `FLAGGED` and `CLEARED` to a truth.
+
+    Raises:
+        ScenarioError: If a step changes a feed speed that does not rule then.
     """
 
     name: str
@@ -79,6 +83,16 @@ class Scenario:
     steps: tuple[Step, ...] = ()
     supervisor: Mapping[str, Any] | None = None
     expect: Mapping[str, bool] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """See that every change of the feed has an effect."""
+        with suppress(ParameterError, MachineFileError):  # which the lathe tells
+            present = vars(cut_from(self.parameters))
+            for number, step in enumerate(self.steps, 1):
+                if refusal := feed_refusal(step.changes, present):
+                    where = f'The scenario {self.name}: step {number}'
+                    raise ScenarioError(f'{where}: {refusal}')
+                present = {**present, **step.changes}
 
     @property
     def parameter_names(self) -> list[str]:

@@ -21,6 +21,7 @@ from lathe_chatter.lathe.cut_event_sentences import (
     knock_sentence,
 )
 from lathe_chatter.model.lathe_parameter_table import LATHE, described_by
+from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.scenario.player import ScenarioPlayer
 from lathe_chatter.scenario.scenario import CLEARED, FLAGGED, Scenario, Step
@@ -90,6 +91,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
     with LatheRun(folder, config.parameters(), simulated=True) as run:
         run.log(BEGINNING)
         simulation = _Simulation(lathe, run, scenario, knocks, tell)
+        simulation.described = config.described
         if monitor:
             simulation.watch(_detector_for(config, scenario))
         simulation.log_doubts()
@@ -135,6 +137,7 @@ class _Simulation:
         self._next_report = 0.0
         self._flag, self._state = False, ''
         self._doubts: list[str] = []
+        self.described: MachineDescription | None = None
         self._told_advice = Advice()
 
     def watch(self, detector: ChatterDetector) -> None:
@@ -176,8 +179,9 @@ class _Simulation:
 
     def log_doubts(self) -> None:
         """Why the samples may not be what was meant; each sentence once."""
-        for sentence in self._lathe.doubts:
-            if sentence not in self._doubts:
+        speed = self.described.speed_doubt(self._lathe.cut) if self.described else ''
+        for sentence in (*self._lathe.doubts, speed):
+            if sentence and sentence not in self._doubts:
                 self._doubts.append(sentence)
                 self._log(self._lathe.time, sentence)
 

@@ -74,9 +74,7 @@ def test_a_file_that_reaches_nobody_is_told_and_one_that_reaches_is_not(
     depth = '{ros__parameters: {depth_of_cut: 0.0003}}'
     files = {
         'root': f'lathe: {depth}',
-        'full': f'/full/lathe: {depth}',
         'wild': f'/**/lathe: {depth}',
-        'one': f'/*/lathe: {depth}',
         'nested': f'nested: {{lathe: {depth}}}',
         'all': '/**: {ros__parameters: {depth_of_cut: 0.0003}}',
     }

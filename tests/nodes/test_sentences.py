@@ -17,23 +17,12 @@ NODES = Path(lathe_chatter.nodes.__file__).parent
 TESTS = Path(__file__).parents[1]
 LATHE, CLOCK = 'nodes/test_lathe_node.py', 'nodes/test_followed_clock.py'
 CONTROL, STANDARD = 'nodes/test_simulation_control.py', 'nodes/test_simulation_services.py'
+ARGUMENTS = 'nodes/test_parameter_arguments.py'
 MAIN, MONITOR = 'nodes/test_node_main.py', 'nodes/test_monitor_node.py'
 STATISTICS, GROUP = 'nodes/test_lathe_diagnostics.py', 'nodes/test_node_processes.py'
 
 SAID = {
     'lathe_node.py': {
-        'waiting for /clock': (
-            'under use_sim_time: nobody publishes /clock, or no time has come yet',
-            f'{CLOCK}::test_without_a_clock_it_waits_and_says_so',
-        ),
-        '{} nodes publish /clock: it must have one owner': (
-            'the node drives or follows /clock, and the graph has so many publishers of it',
-            f'{LATHE}::test_a_second_owner_of_the_clock_is_told',
-        ),
-        '/clock stands still': (
-            'the /clock that is followed has shown the same time for 2 s',
-            f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
-        ),
         '/clock went back by {} s to {} s: the cut goes on from there.': (
             'it shows a time before that of the last tick',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
@@ -54,7 +43,7 @@ SAID = {
             'nodes/test_pacing.py::test_behind_by_more_than_it_may_catch_up_the_excess_is_counted',
         ),
         'Requests take {} of the time: {} in the last second.': (
-            'their callbacks took that part of the second; more than a quarter',
+            'their callbacks, more than one, took that part of the second, more than a quarter',
             f'{LATHE}::test_a_flood_of_requests_is_told',
         ),
         'More than {} knocks between two ticks: the others are dropped.': (
@@ -71,6 +60,18 @@ SAID = {
         ),
     },
     'lathe_graph_watch.py': {
+        'waiting for /clock': (
+            'under use_sim_time: nobody publishes /clock, or no time has come yet',
+            f'{CLOCK}::test_without_a_clock_it_waits_and_says_so',
+        ),
+        '{} nodes publish /clock: it must have one owner': (
+            'the node drives or follows /clock, and the graph has so many publishers of it',
+            f'{LATHE}::test_a_second_owner_of_the_clock_is_told',
+        ),
+        '/clock stands still': (
+            'the /clock that is followed has shown the same time for 2 s',
+            f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
+        ),
         '/clock stands still at {} s, and the cut with it.': (
             'the same; told once each time that it stops',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
@@ -94,7 +95,7 @@ SAID = {
             f'{CLOCK}::test_a_jump_of_the_clock_is_told_and_not_cut',
         ),
         'flooded: requests take much of the time': (
-            'more than a quarter of it since the last report',
+            'more than one took over a quarter of it since the last report',
             f'{LATHE}::test_a_flood_of_requests_is_told',
         ),
         'catching up': (
@@ -171,6 +172,24 @@ SAID = {
         ): (
             'the word is no ROS argument; the node does not start',
             f'{MAIN}::test_a_node_explains_itself_and_takes_no_word_that_it_does_not_know',
+        ),
+    },
+    'parameter_arguments.py': {
+        '-p {} reaches nobody: {} here.': (
+            'no node of the process has that name; it does not start',
+            f'{ARGUMENTS}::test_a_parameter_that_reaches_nobody_keeps_from_starting',
+        ),
+        'The file {} has parameters for {} and for nobody here: {}.': (
+            'none of its sections matches the full name of a node of the process',
+            f'{ARGUMENTS}::test_a_file_that_reaches_nobody_is_told_and_one_that_reaches_is_not',
+        ),
+        '{} and {} are': (
+            'the nodes of the process, where they are several',
+            f'{ARGUMENTS}::test_a_parameter_that_reaches_nobody_keeps_from_starting',
+        ),
+        '{} is': (
+            'the node of the process, where it is one',
+            f'{ARGUMENTS}::test_a_parameter_that_reaches_nobody_keeps_from_starting',
         ),
     },
     'parameter_node.py': {

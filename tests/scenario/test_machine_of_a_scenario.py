@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -71,3 +72,35 @@ def test_a_machine_that_is_none_is_refused_with_its_line(scenario: Path, tmp_pat
     (tmp_path / 'lathe.yaml').write_text('tool:\n  modes: 3\n')
     with pytest.raises(ScenarioError, match=r'lathe\.yaml, line 2'):
         load_scenario(scenario)
+
+
+def test_a_feed_speed_that_does_not_rule_is_refused_and_one_that_does_is_taken(
+    scenario: Path, tmp_path: Path
+) -> None:
+    for changes, rules in (
+        ('feed_speed: 1 mm/s', False),
+        ('feed_speed: 1 mm/s, feed_per_revolution: 0', True),
+        ('feed_speed: 1 mm/s, feed_per_revolution: 0.1 mm', True),
+    ):
+        text = SCENARIO.replace('depth_of_cut: 0.4 mm', changes)
+        scenario.write_text(text)
+        if rules:
+            assert load_scenario(scenario).steps[0].changes['feed_speed'] == 1e-3
+            continue
+        with pytest.raises(ScenarioError, match='step 1: feed_speed is'):
+            load_scenario(scenario)
+    scenario.write_text(SCENARIO.replace('depth_of_cut: 0.4 mm', 'feed_speed: 1 mm/s').replace(
+        'machine: lathe.yaml', 'seed: 1'
+    ))  # fmt: skip
+    loaded = load_scenario(scenario)
+    with pytest.raises(ScenarioError, match='step 1: feed_speed'):
+        replace(loaded, parameters={'machine': str(tmp_path / 'lathe.yaml')})
+
+
+def test_a_speed_that_the_spindle_has_not_is_told(scenario: Path, tmp_path: Path) -> None:
+    scenario.write_text(SCENARIO.replace('depth_of_cut: 0.4 mm', 'spindle_speed_rpm: 3500'))
+    told: list[str] = []
+    loaded = replace(load_scenario(scenario), duration=2.0, expect={})
+    simulate(loaded, tmp_path / 'run', tell=lambda _t, what: told.append(what))
+    doubt = 'The spindle turns outside of what the machine file says it can, 100 to 3000 rev/min.'
+    assert told.count(doubt) == 1
