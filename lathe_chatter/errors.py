@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
+from numbers import Number
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,11 @@ class ParameterError(LatheChatterError, ValueError):
         self.unit = unit
         self.allowed = allowed
         shown = repr(value) if isinstance(value, str) else str(value)
-        super().__init__(f'{name} is {shown}{unit and " " + unit}: it must be {allowed}.')
+        if unit and isinstance(value, Number) and not isinstance(value, bool):
+            shown = f'{shown} {unit}'
+        elif unit and unit not in allowed:  # what is no number has no unit
+            allowed = f'{allowed}, in {unit}'
+        super().__init__(f'{name} is {shown}: it must be {allowed}.')
 
 
 class LayoutError(LatheChatterError, ValueError):

@@ -174,17 +174,24 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
 
 
 def _advice(history: History) -> Iterator[tuple[float, float]]:
-    """When the monitor recommended which speed, s and rev/min: at first, and where it changed."""
+    """When the monitor recommended which speed, s and rev/min.
+
+    At first, where it changed, and the last before the spindle was set, which may have been to it.
+    """
     recommended = history.estimates.get('recommended_speed_rpm')
     turns = [flag.time for flag in history.flags]
     raised = [flag.time for flag in history.flags if flag.chatter]
     last, last_turn = math.nan, -1
-    for time, speed in () if recommended is None else recommended.T.tolist():
+    sets = [change.time for change in history.changes if 'spindle_speed_rpm' in change.new]
+    told = [] if recommended is None else recommended.T.tolist()
+    following = [*(time for time, _ in told[1:]), math.inf]
+    for (time, speed), until in zip(told, following, strict=False):
+        was_set = f'{speed:.0f}' != f'{last:.0f}' and any(time < at <= until for at in sets)
         # The figures that explain a flag are published before it.
         after = next((flag for flag in raised if time <= flag < time + _EXPLAINS), None)
         time = time if after is None else after  # noqa: PLW2901 -- when it was of use
         turn = bisect.bisect_right(turns, time)
-        if turn != last_turn or not abs(speed / last - 1.0) <= _SAME_SPEED:
+        if turn != last_turn or was_set or not abs(speed / last - 1.0) <= _SAME_SPEED:
             yield time, speed
             last, last_turn = speed, turn
 

@@ -81,7 +81,7 @@ def run(options: Namespace) -> int:
     interrupted = play(scenario, file, output, screen, page=options.page)
     if interrupted and not _has_samples(output):
         shutil.rmtree(output, ignore_errors=True)  # else it would pass for a run
-        screen.say('Interrupted before anything was recorded.')
+        screen.say('Interrupted while the nodes were still starting: nothing was recorded.')
         return INTERRUPTED
     if interrupted:
         word = 'Ended' if options.page else 'Interrupted'

@@ -18,7 +18,8 @@ from lathe_chatter.recording import (
 from lathe_chatter.recording.resimulate import finding_of
 
 _NOT_PROVEN = 3
-"""Exit code where nothing is wrong, and the samples can be neither confirmed nor denied."""
+"""Exit code where nothing is wrong, and the run is still being recorded, or its samples can be
+neither confirmed nor denied."""
 EXAMPLE = 'lathe-chatter verify runs/20260401-120000 --resimulate'
 
 
@@ -34,7 +35,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Verify; 0 if nothing is wrong, 1 if something is, 3 if only the proof cannot be given."""
+    """Verify; 0 if nothing is wrong, 1 if something is, 3 if that cannot be told."""
     screen = Screen(json=options.json)
     found = _verified(options.run_path, screen, again=options.resimulate)
     for name, count in sorted(found.messages.items()):
@@ -45,8 +46,9 @@ def run(options: Namespace) -> int:
         screen.say(_rank(finding) + finding.text)
     unproven = any(finding.unproven for finding in found.findings)
     nothing = '' if found.samples else ', and without samples of a lathe'
-    screen.say(f'{"complete" if found.complete else "NOT complete"}{nothing}')
-    if unproven:
+    unfinished = 'NOT complete' if found.lossy else 'not complete yet: nothing is missing so far'
+    screen.say(f'{"complete" if found.complete else unfinished}{nothing}')
+    if unproven and found.finished:
         screen.say('NOT PROVEN: what cannot be computed again is neither confirmed nor denied')
     screen.json(
         {
@@ -56,7 +58,7 @@ def run(options: Namespace) -> int:
             'findings': found.findings,
         }
     )
-    return 1 if not found.complete else _NOT_PROVEN if unproven else 0
+    return 1 if found.lossy else _NOT_PROVEN if unproven else 0
 
 
 def _rank(finding: Finding) -> str:

@@ -17,8 +17,6 @@ _MICRO = 1e-3
 _LATEST = 4096
 FLOOD = 0.25
 """Fraction of the time that requests take when they are called a flood."""
-_FEW = 1
-"""Requests in a second that are none yet, however long they take: a reset takes long by itself."""
 _LATE = 0.1
 """s behind the clock from which a node no longer keeps up."""
 
@@ -73,6 +71,7 @@ class TickStatistics:
         self.ticks = 0
         self._steps = Durations()
         self._lateness = Durations()
+        self._before = _Mark(0, 0, 0.0, 0, 0, time.monotonic_ns())
         self.begin_second()
 
     def note_tick(self, duration: int, lathe: VirtualLathe) -> None:
@@ -95,6 +94,7 @@ class TickStatistics:
         """Forget what belonged to the second that was reported."""
         now = time.monotonic_ns()
         requests = self._requests
+        self._share_before = self.requests_share
         self._before = _Mark(
             self.ticks, self._pacer.overruns, self._pacer.lag, requests.served, requests.taken, now
         )
@@ -110,8 +110,11 @@ class TickStatistics:
 
     @property
     def flooded(self) -> bool:
-        """Whether many requests took much of the time in this second."""
-        return self.requests_share > FLOOD and self.requests_served > _FEW
+        """Whether requests took much of the time in this second and in the one before.
+
+        In one alone a single reset does.
+        """
+        return min(self.requests_share, self._share_before) > FLOOD
 
     @property
     def requests_served(self) -> int:

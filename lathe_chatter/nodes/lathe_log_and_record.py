@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from lathe_chatter.model import Cut
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
 from lathe_chatter.nodes.log_rate_limit import QuickLog
 from lathe_chatter.recording import LatheRun
+from lathe_chatter.recording.provenance import ended_by
 
 _COMMIT_PERIOD = 0.25
 """s between two commits: what a kill can lose."""
@@ -89,10 +91,10 @@ class LatheRecord:
         return [Status('own record', OK, 'recording', {'run': self._folder})]
 
     def close(self) -> None:
-        """Finish the run."""
+        """Finish the run, which says so where an error ends the node."""
         if self._run is not None:
             try:
-                self._run.close()
+                self._run.close(ended_by(sys.exc_info()[1]))
             except OSError as error:
                 self._fail(error)
             self._run = None

@@ -100,6 +100,7 @@ class MonitorNode(ParameterNode):
         self._mode = Mode.WAITING
         self._faults: tuple[str, ...] = ()
         self._senders: list[str] = []  # where they are several, and nothing is judged
+        self._silent = False
         self._heard_at = self._leapt_at = self._newest = -math.inf
         self._figures: Mapping[str, float] = {}
         self._details: Mapping[str, object] = {}
@@ -173,9 +174,10 @@ class MonitorNode(ParameterNode):
             return jumped or many or self._subscription.has_new_publisher()
 
         order = self._continuity.join(times, is_another)
-        if order is BlockOrder.CONTIGUOUS:
-            return True
         start = f'{times[0]:.6f} s'
+        if order is BlockOrder.CONTIGUOUS:
+            self._end_silence(start)
+            return True
         if order is BlockOrder.GAP:
             self._say('lost', f'At {before:.6f} s: the samples up to {start} did not come.')
             return True
@@ -201,6 +203,11 @@ class MonitorNode(ParameterNode):
         if self._asked is not None:
             self._asked.ask()  # it may be another machine
         return True
+
+    def _end_silence(self, start: str) -> None:
+        if self._silent:
+            self._silent = False
+            self._say('samples again', f'At {start}: samples come again.')
 
     def _is_mixture(self, now: float) -> bool:
         """Whether two lathes send at once: times leap again, within a second, and many publish."""
@@ -329,19 +336,23 @@ class MonitorNode(ParameterNode):
         silent = self._heard_at == self._reported.heard_at
         if silent and self._senders:
             self._senders, self._continuity.last = [], None
-        elif silent and self._state != _UNKNOWN:
+        elif silent and not self._silent and self._continuity.last is not None:
+            self._silent, self._figures, self._details = True, {}, {}
             self._set_state(_UNKNOWN)
             self._say('silence', f'At {self._continuity.last:.6f} s: no samples come any more.')
         if not silent:
+            self._silent = False
             self._subscription.remember_publishers()
         self._diagnostics.publish(self._statuses(silent=silent))
         self._reported = _Reported(self._heard_at, self._continuity.lost)
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
         cut = {'state': self._state, 'flag': self._flag, **self._figures, **self._details}
+        # Whether the chatter of a flag that is up goes on is not known then.
+        level = WARN if self._silent and self._flag else _LEVELS.get(self._state, OK)
         return [
             self._samples_status(silent=silent),
-            Status('cut', _LEVELS.get(self._state, OK), self._state, cut),
+            Status('cut', level, self._state, cut),
         ]
 
     def _samples_status(self, *, silent: bool) -> Status:

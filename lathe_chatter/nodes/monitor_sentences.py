@@ -49,9 +49,14 @@ SENTENCES = {
         'times leave samples out that one and the same publisher could have sent',
     ),
     'silence': Sentence(
-        'info',
+        'warning',
         _AT + r'no samples come any more\.',
         'no sample came for a second, and some had before',
+    ),
+    'samples again': Sentence(
+        'info',
+        _AT + r'samples come again\.',
+        'it was said that none come, and the next of the same run have come',
     ),
     'two publishers': Sentence(
         'error',

@@ -27,10 +27,12 @@ from lathe_chatter.nodes.topic_discovery import TopicWatch, selection
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence
 from lathe_chatter.recording.provenance import (
+    ENDED_EARLY,
     IDENTITY,
     PARAMETERS,
     PAUSES,
     RECEPTION,
+    ended_by,
     identity,
     parameter_values,
 )
@@ -161,8 +163,7 @@ class RecorderNode(ParameterNode):
         self._failure = ''
         self._watch = TopicWatch(self, wanted, sink, self._write)
         self._log, self._stalls = RunLog(), ReceiveStalls()
-        self._clock_watch, self._flags = ClockWatch(), 0
-        self._left_out = 0
+        self._clock_watch, self._flags, self._left_out = ClockWatch(), 0, 0
         self._noted: dict[str, list[tuple[dict[str, Any], int]]] = {}
         self._remote = RemoteParameters(self, self._note_parameters)
         middleware = get_rmw_implementation_identifier()
@@ -180,8 +181,8 @@ class RecorderNode(ParameterNode):
         except OSError as error:
             self.get_logger().warning(f'{file} is not attached to the run: {reason_of(error)}.')
 
-    def stop(self) -> Answer:
-        """Finish the run, with everything that has arrived."""
+    def stop(self, ended_early: str = '') -> Answer:
+        """Finish the run, with everything that has arrived; also before its time, and why."""
         if self._watch is None or (self._writer is None and self._snapshot is None):
             return _NOTHING
         self._look(closely=True)  # who came a moment ago is no riddle later
@@ -197,6 +198,8 @@ class RecorderNode(ParameterNode):
             writer.commit()
             if self._log.pauses:
                 writer.note(PAUSES, self._log.pause_values())
+            if ended_early:
+                writer.note(ENDED_EARLY, {'reason': ended_early})
             writer.note(RECEPTION, {**self._watch.reception(), **self._stalls.values()})
             writer.note(SUMMARY, closing_summary(self._log, self._noted))
             writer.close()
@@ -207,8 +210,8 @@ class RecorderNode(ParameterNode):
             return Answer(done=False, message=self._failure)
         lost = sum(map(self.lost_of, self._topics))
         count = sum(map(self.messages_of, self._topics))
-        held = f'{count} messages, and {lost} were lost on the way'
-        return Answer(done=True, message=f'{writer.folder} holds {held}.')
+        held = f'{writer.folder} holds {count} messages, and {lost} were lost on the way.'
+        return Answer(done=True, message=held)
 
     def split(self) -> Answer:
         """Go on in a new file of the run.
@@ -254,15 +257,14 @@ class RecorderNode(ParameterNode):
         return Answer(done=True, message=said)
 
     def finish(self) -> None:
-        """Finish the run.
+        """Finish the run, which says so where an error ends the node.
 
         Raises:
             RecordingFailedError: If its end is not on disk.
-        """
-        # Kilted destroys nodes, too, that were refused half-made.
+        """  # Kilted destroys nodes, too, that were refused half-made.
         if getattr(self, '_writer', None) is None:
             return
-        done, said = self.stop()
+        done, said = self.stop(ended_by(sys.exc_info()[1]))
         if not done:
             self.get_logger().error(said)
             raise RecordingFailedError(said)
@@ -363,8 +365,7 @@ class RecorderNode(ParameterNode):
             self._take()
 
     def _fail(self, error: Exception) -> None:
-        folder = self.run
-        said = str(error) if isinstance(error, LatheChatterError) else f'{folder}: {error}.'
+        said = str(error) if isinstance(error, LatheChatterError) else f'{self.run}: {error}.'
         self._failure = said
         self.get_logger().error(said)
         if self._writer is not None:

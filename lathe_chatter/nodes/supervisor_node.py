@@ -67,7 +67,8 @@ class SupervisorNode(ParameterNode):
         # Compiled or loaded before there is any hurry.
         list(moves_for(may_be(Machine(), 0.01), Cut(), Limits()))
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
-        self._chatter, self._state = False, ''
+        self._state = ''
+        self._chatter: bool | None = None  # until the monitor has said
         self._heard_at = self._lost_at = -math.inf
         self._lost = self._restarts = -1
         self._reports = DiagnosticsListener()
@@ -224,7 +225,7 @@ class SupervisorNode(ParameterNode):
         return Seen(
             now,
             cut,
-            self._chatter,
+            bool(self._chatter),
             **figures,
             cutting_stiffness=stiffness,
             tool_frequency=float(heard.get(TOOL_FREQUENCY, math.nan)),
@@ -251,7 +252,7 @@ class SupervisorNode(ParameterNode):
             if time.monotonic() > self._answer[1] + _NO_ANSWER:
                 self._answer = None
                 self._say_of(self._core.refused('it does not answer'))
-        elif self._cut is not None:
+        elif self._cut is not None and self._chatter is not None:
             self._do(self._core.look(self._seen(self._cut)))
 
     def _on_accept(self, _request: Any, response: Any) -> Any:

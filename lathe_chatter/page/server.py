@@ -42,6 +42,7 @@ from lathe_chatter.page.versioned_values import Board, encode_frame
 
 FRAME_PERIOD = 0.05
 """s from one frame of a viewer to the next."""
+_SHORTEST_TOKEN = 16
 _STATIC = Path(__file__).with_name('static')
 _MOST_VIEWERS, _MOST_CONNECTIONS = 32, 96
 _MESSAGE_SIZE, _MESSAGES, _BURST = 4096, 100.0, 300.0
@@ -117,7 +118,11 @@ class PageServer:
 
     def __init__(self, source: Source, host: str, port: int, token: str = '') -> None:
         """Listen; `run` serves."""
-        if not _is_loopback(host) and len(token) < 16:
+        if token and len(token) < _SHORTEST_TOKEN:
+            raise StartError(
+                f'token has {len(token)} characters: it must have {_SHORTEST_TOKEN} or more.'
+            )
+        if not (token or _is_loopback(host)):
             raise StartError(
                 f'host {host} lets other machines in: give a token of 16 characters or more, '
                 'which those who act will need.'

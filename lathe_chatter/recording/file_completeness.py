@@ -14,7 +14,7 @@ from lathe_chatter.recording.received_counts import taken
 from lathe_chatter.recording.recorded_file import Note
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.split_file_writer import CLOSED
-from lathe_chatter.recording.verification_result import Verification
+from lathe_chatter.recording.verification_result import Finding, Verification
 
 _STILL = 'The run is still being recorded: this is what is on disk of it.'
 
@@ -51,7 +51,10 @@ def check_end(found: Verification, notes: list[Note]) -> None:
     end = max((count.last for count in found.samples.values()), default=math.nan)
     for text in lost_at_the_end(found.run, found.messages, found.last, end):
         found.finished = False
-        found.add_loss(text)
+        if text == _STILL:
+            found.findings.append(Finding(loss=False, text=text, unproven=True))
+        else:
+            found.add_loss(text)
     for note in notes:
         if note.name == ENDED_EARLY:
             found.add_loss(f'The run ended early. {note.values.get("reason", "")}'.strip())

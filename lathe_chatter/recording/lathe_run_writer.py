@@ -14,6 +14,7 @@ from lathe_chatter.recording.provenance import (
     ENDED_EARLY,
     IDENTITY,
     PARAMETERS,
+    ended_by,
     identity,
     parameter_values,
 )
@@ -152,11 +153,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         """Close; after an exception the run says that it ended early."""
-        if error is None:
-            self.close()
-            return
-        interrupted = isinstance(error, KeyboardInterrupt)
-        self.close('It was interrupted.' if interrupted else f'It failed: {error}')
+        self.close(ended_by(error))
 
     def _announce(self, topic: str, kind: str) -> None:
         self.writer.add_topic(topic_of_type(topic, kind))

@@ -136,6 +136,19 @@ def noted_pauses(notes: Iterable[Any], name: str) -> list[tuple[float, float]]:
     return found
 
 
+def ended_by(error: BaseException | None) -> str:
+    """What `ENDED_EARLY` says of a writer that an error ends, a sentence; empty of any other end.
+
+    Args:
+        error: On its way while the writer is closed; None where none is.
+    """
+    if error is None or isinstance(error, SystemExit):
+        return ''
+    if isinstance(error, KeyboardInterrupt):
+        return 'It was interrupted.'
+    return f'It failed: {str(error) or type(error).__name__}'
+
+
 def parameter_values(answers: Sequence[tuple[Mapping[str, Any], int]]) -> dict[str, str]:
     """The values of a record of parameters.
 

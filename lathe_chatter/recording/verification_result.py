@@ -58,8 +58,13 @@ class Verification:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is missing or damaged."""
-        return not any(finding.loss for finding in self.findings)
+        """Whether the run came to its end, and nothing is missing or damaged."""
+        return self.finished and not self.lossy
+
+    @property
+    def lossy(self) -> bool:
+        """Whether something is missing or damaged."""
+        return any(finding.loss for finding in self.findings)
 
     def add_loss(self, text: str) -> None:
         """Something is missing or damaged."""

@@ -105,7 +105,7 @@ class Move:
         cut: To go to.
         growth_rate: Predicted there, the greater one of open and seated where both may be, 1/s.
         margin: By what fraction its depth may still grow; nan where the speed varies.
-        kept: Of the removal rate, 1 for all.
+        kept: Of the removal rate; more than 1 where a faster spindle more than makes up for depth.
         share: Of the machines that the truth may be, those on which it is stable.
     """
 
@@ -344,7 +344,7 @@ class _Search:
                 self._machines[0], new.spindle_speed_rpm, seated=True, process=self._process
             )
             margin = float(depths.min()) / new.depth_of_cut - 1.0
-        kept = min(removal_rate(new) / max(removal_rate(self._cut), 1e-30), 1.0)
+        kept = removal_rate(new) / max(removal_rate(self._cut), 1e-30)
         return Move(new, self._growth(0, new), margin, kept, share)
 
     def _growth(self, number: int, new: Cut) -> float:

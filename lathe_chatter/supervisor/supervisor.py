@@ -144,6 +144,7 @@ class Supervisor:
         self.limits, self.mode, self._machine_error = limits, mode, machine_error
         self._margin_limit, self._move_early, self._hands_off = margin_limit, move_early, hands_off
         self._hand_at = -math.inf
+        self._has_seen_quiet = False
         self._levels: deque[tuple[float, float]] = deque()
         self._quiet_levels: deque[float] = deque(maxlen=_LOOKS)
         self._safe_since = math.nan
@@ -344,10 +345,14 @@ class Supervisor:
     def _quiet(self, seen: Seen) -> Action | None:
         """Say that it is over, and watch the margin."""
         if not math.isnan(self._alarm_at):
-            lasted, moves = seen.time - self._alarm_at, self.moves
+            when = f', {seen.time - self._alarm_at:.1f} s after the flag'
+            if not self._has_seen_quiet:  # the flag was up before anybody looked
+                when = ''
+            moves, self._has_seen_quiet = self.moves, True
             self._forget()
             word = 'move' if moves == 1 else 'moves'
-            return Action(f'The chatter has ended, {lasted:.1f} s after the flag; {moves} {word}.')
+            return Action(f'The chatter has ended{when}; {moves} {word}.')
+        self._has_seen_quiet = True
         if math.isfinite(seen.amplitude):
             self._quiet_levels.append(seen.amplitude)
         if not seen.margin < self._margin_limit:

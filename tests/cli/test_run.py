@@ -210,7 +210,7 @@ def test_interrupted_before_the_first_sample_it_says_so(
         process.send_signal(signal.SIGINT)
         said, _ = process.communicate(timeout=60)
     assert process.returncode == 130, said
-    assert 'Interrupted before anything was recorded.' in said
+    assert 'Interrupted while the nodes were still starting: nothing was recorded.' in said
     assert 'Traceback' not in said
     assert not output.exists()
 

@@ -93,7 +93,7 @@ SENTENCES: dict[str, tuple[str, ...]] = {
     r'CPU time in one thread\.': ('bench',),
 }
 TOLD_ELSEWHERE = {
-    'Interrupted before anything was recorded.': 'test_run.py',
+    'Interrupted while the nodes were still starting: nothing was recorded.': 'test_run.py',
     'Interrupted: the run is finished and reported ...': 'test_run.py',
     'Interrupted: the run above is recorded up to that moment.': 'test_run.py',
     'Interrupted: what was drawn is removed again.': 'test_reproduce.py',

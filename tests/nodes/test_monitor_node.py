@@ -219,10 +219,29 @@ def test_silence_makes_the_state_unknown_and_keeps_the_flag(
 ) -> None:
     flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
     states = bench.listen(String, '/chatter_monitor/state', LATCHED)
-    machine(UNSTABLE).cut(2.0)
+    diagnostics = bench.listen(DiagnosticArray, '/diagnostics')
+    there = machine(UNSTABLE)
+    there.cut(2.0)
     bench.spin_until(lambda: states[-1].data == 'chatter', 'chatter')
+    bench.spin_until(lambda: cut_status(diagnostics).level == DiagnosticStatus.ERROR, 'the error')
     bench.spin_until(lambda: states[-1].data == 'unknown', 'silence noticed')
     assert flags[-1].data
+    bench.spin_until(lambda: cut_status(diagnostics).message == 'unknown', 'its report')
+    silent = cut_status(diagnostics)
+    assert silent.level == DiagnosticStatus.WARN
+    # No figure of before, as a recommended speed.
+    assert {entry.key: entry.value for entry in silent.values} == {
+        'state': 'unknown',
+        'flag': 'True',
+    }
+    there.cut(0.5)
+    bench.spin_until(lambda: cut_status(diagnostics).level == DiagnosticStatus.ERROR, 'chatter')
+
+
+def cut_status(messages: list[DiagnosticArray]) -> DiagnosticStatus:
+    """The newest of the cut; an empty one before."""
+    found = [s for m in messages for s in m.status if s.name == '/chatter_monitor: cut']
+    return found[-1] if found else DiagnosticStatus()
 
 
 def value(messages: list[DiagnosticArray], part: str, key: str) -> str:

@@ -84,6 +84,12 @@ def listening(shop: Shop) -> None:
     shop.send(shop.bench.talk(Float64MultiArray, '/lathe/samples'), chatters(1.0))
 
 
+def resumed(shop: Shop) -> None:
+    publisher = flagged(shop)
+    shop.says('silence')
+    shop.send(publisher, shifted(chatters(0.1), 2.0))
+
+
 def lost(shop: Shop) -> None:
     shop.monitor()
     samples = chatters(0.5)
@@ -210,6 +216,7 @@ STORIES: dict[str, Callable[[Shop], None]] = {
     'withdrawn': restart_while_flagged,
     'jump': jump,
     'silence': listening,
+    'samples again': resumed,
     'two publishers': two_publishers,
     'best effort': best_effort,
     'machine': asks_the_lathe,

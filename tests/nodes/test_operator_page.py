@@ -273,6 +273,7 @@ def test_another_host_needs_a_token_and_a_taken_port_is_said(page: Page) -> None
     port = page.url().split(':')[2].strip('/')
     for parameter, said in (
         ('host:=0.0.0.0', 'give a token of 16 characters'),
+        ('token:=short', 'token has 5 characters: it must have 16 or more.'),
         (f'port:={port}', f'port {port} of 127.0.0.1 cannot be had'),
     ):
         page.start('operator_page', parameter)

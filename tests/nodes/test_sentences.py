@@ -43,7 +43,7 @@ SAID = {
             'nodes/test_pacing.py::test_behind_by_more_than_it_may_catch_up_the_excess_is_counted',
         ),
         'Requests take {} of the time: {} in the last second.': (
-            'their callbacks, more than one, took that part of the second, more than a quarter',
+            'their callbacks took that part of the second, and over a quarter of the one before',
             f'{LATHE}::test_a_flood_of_requests_is_told',
         ),
         'More than {} knocks between two ticks: the others are dropped.': (
@@ -95,7 +95,7 @@ SAID = {
             f'{CLOCK}::test_a_jump_of_the_clock_is_told_and_not_cut',
         ),
         'flooded: requests take much of the time': (
-            'more than one took over a quarter of it since the last report',
+            'more than a quarter of it since the last report, and in the second before',
             f'{LATHE}::test_a_flood_of_requests_is_told',
         ),
         'catching up': (

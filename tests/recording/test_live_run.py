@@ -9,8 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from support.recorded import number, topic
 
+from lathe_chatter.cli.main import main
 from lathe_chatter.recording import RunWriter, read_run, recover, verify
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -67,7 +69,9 @@ def test_a_run_that_grows_is_sound_at_every_look(tmp_path: Path) -> None:
     assert before > first  # it did grow
 
 
-def test_verify_says_of_a_run_that_grows_that_it_does(tmp_path: Path) -> None:
+def test_verify_says_of_a_run_that_grows_that_it_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with being_written(tmp_path / 'run'):
         for _ in range(LOOKS // 3):
             found = verify(tmp_path / 'run')
@@ -75,6 +79,14 @@ def test_verify_says_of_a_run_that_grows_that_it_does(tmp_path: Path) -> None:
                 'The run is still being recorded: this is what is on disk of it.'
             ]
             assert not found.complete
+            assert not found.lossy
+        capsys.readouterr()
+        assert main(['verify', str(tmp_path / 'run')]) == 3
+        said = capsys.readouterr().out
+        assert 'UNSURE The run is still being recorded' in said
+        assert 'not complete yet: nothing is missing so far' in said
+        assert 'WRONG' not in said
+    assert main(['verify', str(tmp_path / 'run')]) == 1
     found = verify(tmp_path / 'run')
     assert 'The recorder did not finish' in found.findings[-1].text
 

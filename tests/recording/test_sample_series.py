@@ -32,7 +32,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         ({'columns': 'time'}, "columns is 'time': it must be a list of names of columns."),
         ({'columns': 5}, 'columns is 5: it must be a list of names of columns.'),
         ({'columns': []}, 'columns is []: it must be a list of names of columns.'),
-        ({'start': 'a'}, "start is 'a' s: it must be a number."),
+        ({'start': 'a'}, "start is 'a': it must be a number, in s."),
         ({'end': math.nan}, 'end is nan s: it must be a number.'),
         ({'start': 2, 'end': 1}, 'start is 2.0 s: it must be at most the end, 1 s.'),
     ],

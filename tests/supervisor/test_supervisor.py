@@ -46,6 +46,17 @@ def test_chatter_is_ended_by_one_move_to_a_stable_speed() -> None:
     assert not faults_of(there, CALM.with_changes(depth_of_cut=DEEP))
 
 
+@pytest.mark.parametrize(('quiet_before', 'when'), [(True, ', 1.2 s after the flag'), (False, '')])
+def test_of_a_flag_that_was_up_before_no_time_is_said(*, quiet_before: bool, when: str) -> None:
+    supervisor = Supervisor(Limits(), Mode.ACT)
+    if quiet_before:
+        assert supervisor.look(Seen(0.0, CALM)) is None
+    supervisor.look(Seen(1.0, CALM, chatter=True))
+    action = supervisor.look(Seen(2.2, CALM))
+    assert action is not None
+    assert action.sentence == f'The chatter has ended{when}; 0 moves.'
+
+
 def test_the_ramp_is_kept() -> None:
     there = chattering(limits=Limits(ramp=1000.0))
     there.run(2.5)
