@@ -94,6 +94,7 @@ SENTENCES: dict[str, tuple[str, ...]] = {
 }
 TOLD_ELSEWHERE = {
     'Interrupted while the nodes were still starting: nothing was recorded.': 'test_run.py',
+    'not complete yet: nothing is missing so far': 'recording/test_live_run.py',
     'Interrupted: the run is finished and reported ...': 'test_run.py',
     'Interrupted: the run above is recorded up to that moment.': 'test_run.py',
     'Interrupted: what was drawn is removed again.': 'test_reproduce.py',

@@ -265,7 +265,7 @@ NO_SENTENCE = {
     'step time max, us', 'lateness p99, us', 'lateness max, us', 'behind the clock, s',
     'requests in the last second', 'time taken by requests, fraction', 'simulated time, s',
     'bearing contact', 'bearing engaged, fraction of ticks', 'tool in cut, fraction of ticks',
-    'spindle speed, rev/min', 'depth of cut, m', 'bearing clearance, m',
+    'spindle speed, rev/min', 'depth of cut, m', 'bearing clearance, m', 'time 0 on /clock, s',
 }  # fmt: skip
 
 
