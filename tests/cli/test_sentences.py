@@ -233,6 +233,7 @@ def situations(folder: Path, runs: dict[str, Path]) -> Iterator[tuple[str, list[
 
 @pytest.fixture(scope='module')
 def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    pytest.importorskip('pyarrow', reason='the plan of a data set asks for Parquet')
     folder = tmp_path_factory.mktemp('said')
     told = {}
     for name, call in situations(folder, made(tmp_path_factory.mktemp('runs'))):
