@@ -10,7 +10,7 @@ from pathlib import Path
 from lathe_chatter.cli.common_options import add_force, add_json, in_unit, picture_file
 from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.detection import ChatterDetector
-from lathe_chatter.detection.filters import UNKNOWN_MACHINE
+from lathe_chatter.detection.filter_design import UNKNOWN_MACHINE
 from lathe_chatter.detection.sensors_to_displacement import sensors_among
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import Judged, Score, judge, read_signals, score

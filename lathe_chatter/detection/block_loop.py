@@ -25,7 +25,7 @@ from lathe_chatter.detection.detector_state import (
     WINDOWS,
     DetectorState,
 )
-from lathe_chatter.detection.filters import Kernels
+from lathe_chatter.detection.filter_design import Kernels
 from lathe_chatter.detection.machine_check import take_hop
 from lathe_chatter.detection.signal_conditioning import Memory, follow
 from lathe_chatter.detection.structured_arrays import Records
@@ -104,7 +104,7 @@ def take_hops(
         mechanics_: From `identification.mechanics_of`.
         noise_: One record of `identification.NOISE_SUMS`, to work in.
         total_: One record of `signals.HOP_SUMS`, to work in.
-        kernels: From `filters.design`.
+        kernels: From `filter_design.design`.
         memory: Of the signals, changed in place.
         products: Sums of the last hops (HOPS,), a ring, changed in place.
         windows: What they say by the machine (windows,), written.

@@ -16,8 +16,8 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.filters import BAND_BAND, FORCE_BAND, INERTIA_BAND
-from lathe_chatter.detection.filters import FORCE_FORCE as SPILL_FORCE
+from lathe_chatter.detection.filter_design import BAND_BAND, FORCE_BAND, INERTIA_BAND
+from lathe_chatter.detection.filter_design import FORCE_FORCE as SPILL_FORCE
 from lathe_chatter.detection.signal_conditioning import add, clear
 from lathe_chatter.detection.structured_arrays import Records, record, record_type
 from lathe_chatter.model import Machine
@@ -180,7 +180,7 @@ def noise_sums(spill: Array, tool: float, workpiece: float, turn: float, noise: 
     """What white noise of the thinned samples adds to the sums of one output.
 
     Args:
-        spill: From `filters.Kernels`.
+        spill: From `filter_design.Kernels`.
         tool: Variance of the noise of the tool's thinned samples, m2.
         workpiece: The same of the workpiece.
         turn: Thinned samples a turn.

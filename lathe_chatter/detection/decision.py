@@ -29,7 +29,6 @@ from lathe_chatter.detection.baseline import (
     growth_by_energy,
     restart_baseline,
 )
-from lathe_chatter.detection.best_window import is_cutting, state_of, write_figures
 from lathe_chatter.detection.detector_state import (
     HOPS,
     REJECTED,
@@ -37,7 +36,8 @@ from lathe_chatter.detection.detector_state import (
     WINDOWS,
     DetectorState,
 )
-from lathe_chatter.detection.filters import Complex
+from lathe_chatter.detection.filter_design import Complex
+from lathe_chatter.detection.reported_figures import is_cutting, state_of, write_figures
 from lathe_chatter.detection.signal_conditioning import PHASE_SEEN
 from lathe_chatter.detection.structured_arrays import Records
 

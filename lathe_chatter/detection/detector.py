@@ -7,18 +7,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.band_judge import (
+from lathe_chatter.detection.band_detector import (
     ADVISED_LONG_AGO,
     TO_BE_ADVISED,
-    BandJudge,
+    BandDetector,
     Thresholds,
 )
 from lathe_chatter.detection.detector_state import UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
-from lathe_chatter.detection.filters import HIGHEST_SEEN, UNKNOWN_MACHINE, Band, band_of, bands_of
-from lathe_chatter.detection.hops import Discontinuity, Framer, HopBlock, StreamFormat
-from lathe_chatter.detection.line_watch import LineWatch
+from lathe_chatter.detection.filter_design import (
+    HIGHEST_SEEN,
+    UNKNOWN_MACHINE,
+    Band,
+    band_of,
+    bands_of,
+)
+from lathe_chatter.detection.signal_framing import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.speed_adviser import SpeedAdviser
+from lathe_chatter.detection.steady_tone_alarm import SteadyToneAlarm
 from lathe_chatter.detection.structured_arrays import values_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine
@@ -98,8 +104,8 @@ class ChatterDetector:
 
     def _forget_format(self) -> None:
         self._prepared: tuple[float, Mode] | None = None
-        self._judges: list[BandJudge] = []
-        self._lines: LineWatch | None = None
+        self._judges: list[BandDetector] = []
+        self._lines: SteadyToneAlarm | None = None
         self._speaker = 0
 
     def update(self, samples: Array, columns: Sequence[str]) -> Estimate:
@@ -180,14 +186,16 @@ class ChatterDetector:
             alarm_age = age if self._estimate.chatter else None
             self._speaker, self._advised = 0, True
             self._judges = [
-                BandJudge(self._machine, band, form, self._thresholds, adviser, alarm_age)
+                BandDetector(self._machine, band, form, self._thresholds, adviser, alarm_age)
                 for band, adviser in zip(bands, self._advisers, strict=False)
             ]
             listens = bool(bands) and (form.mixed or not form.angle)
             self._lines = None
             if listens:
                 seen = form.angle and not form.nominal
-                self._lines = LineWatch(self._judges, self._thresholds.strictness, angle=seen)
+                self._lines = SteadyToneAlarm(
+                    self._judges, self._thresholds.strictness, angle=seen
+                )
         usual = max(1, round(_LOOK * form.rate))
         narrow = len(self._judges) == 1 and self._lines is None
         self._framer.hop = self._judges[0].hop if narrow else usual
@@ -227,7 +235,7 @@ class ChatterDetector:
         self._estimate = self._new_estimate(time)
         self._begin_with_machine()
 
-    def _machine_in_words(self, judge: BandJudge) -> str:
+    def _machine_in_words(self, judge: BandDetector) -> str:
         """Whether the machine that was told is believed; empty where it is."""
         if self._machine is None or self._told is None or self._mode is not Mode.FULL:
             return ''

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.filters import Complex
+from lathe_chatter.detection.filter_design import Complex
 from lathe_chatter.detection.structured_arrays import Records, record, record_type
 
 HOPS = 64

@@ -21,7 +21,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.filters import Complex, Kernels
+from lathe_chatter.detection.filter_design import Complex, Kernels
 from lathe_chatter.model import Machine
 
 _LAGS = np.array([1.0, 4.0 / 3.0, 5.0 / 3.0])

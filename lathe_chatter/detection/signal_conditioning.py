@@ -19,7 +19,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.detection.filters import Complex, Kernels
+from lathe_chatter.detection.filter_design import Complex, Kernels
 from lathe_chatter.detection.machine_check import FitSums, add_output, new_sums
 from lathe_chatter.detection.structured_arrays import Records, record, record_type
 

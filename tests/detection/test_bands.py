@@ -10,7 +10,7 @@ import pytest
 
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.detection.estimate import Mode
-from lathe_chatter.detection.filters import Band, bands_of
+from lathe_chatter.detection.filter_design import Band, bands_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine

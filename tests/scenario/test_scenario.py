@@ -118,7 +118,10 @@ def test_the_least_that_a_scenario_needs_is_its_duration(tmp_path: Path) -> None
         ('duration: 1\nsteps: [{at: 1, set: {sample_rate: 5}}]', "'sample_rate' cannot change"),
         ('duration: 1\nsteps: [{at: 1, set: {depth: 5}}]', 'did you mean depth_of_cut?'),
         ('duration: 1\nsteps: [{at: 1, set: {zzz: 5}}]', 'what can change is'),
-        ('duration: 1\nsteps: [{at: 1, set: {depth_of_cut: 1 kg}}]', "depth_of_cut is '1 kg' m"),
+        (
+            'duration: 1\nsteps: [{at: 1, set: {depth_of_cut: 1 kg}}]',
+            "depth_of_cut is '1 kg': it must be",
+        ),
         ('duration: 1\nexpect: {flagged: 1}', 'expect.flagged must be true or false'),
         ('duration: 1\nexpect: {chatter: true}', "no key 'chatter'"),
     ],

@@ -14,10 +14,7 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import piece_end as at
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
-from lathe_chatter.lathe.integrator.first_crossing import NEVER
-from lathe_chatter.lathe.integrator.lanes import fma
-from lathe_chatter.lathe.integrator.piece_end import by_time, plan_piece
-from lathe_chatter.lathe.integrator.power_series import (
+from lathe_chatter.lathe.integrator.event_in_piece import (
     NOTHING,
     Machine,
     Scratch,
@@ -25,7 +22,10 @@ from lathe_chatter.lathe.integrator.power_series import (
     kind_of,
     solve_series,
 )
+from lathe_chatter.lathe.integrator.first_crossing import NEVER
+from lathe_chatter.lathe.integrator.piece_end import by_time, plan_piece
 from lathe_chatter.lathe.integrator.propagation import coordinates_at, read_outputs
+from lathe_chatter.lathe.integrator.simd_vectors import fma
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.state_layout import (
     BEARING_V,

@@ -1,8 +1,8 @@
 """Whole steps in which nothing happens, eight at a time.
 
 Nearly every step of a run is one: no corner in the surface that the tool meets, no change of
-contact or cutting. This loop takes such steps in blocks (lanes.py), with noise, unbalance and a
-varied speed, and stops before the first that is not; event_step.py then takes that one.
+contact or cutting. This loop takes such steps in blocks (simd_vectors.py), with noise, unbalance
+and a varied speed, and stops before the first that is not; event_step.py then takes that one.
 
 A turn has many more steps than a block, so the surface that a block meets is there before it
 begins; surface_met.py reads it.
@@ -14,11 +14,13 @@ from typing import Any
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import block as at
 from lathe_chatter.lathe.integrator import random_numbers, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator import step_block_layout as at
 from lathe_chatter.lathe.integrator.first_crossing import may_turn_back
-from lathe_chatter.lathe.integrator.lanes import (
+from lathe_chatter.lathe.integrator.output_samples import COLUMNS, add_runout, write_accelerations
+from lathe_chatter.lathe.integrator.piece_end import by_time
+from lathe_chatter.lathe.integrator.simd_vectors import (
     LANES,
     after,
     before,
@@ -34,8 +36,6 @@ from lathe_chatter.lathe.integrator.lanes import (
     spread,
     turned_on,
 )
-from lathe_chatter.lathe.integrator.output_samples import COLUMNS, add_runout, write_accelerations
-from lathe_chatter.lathe.integrator.piece_end import by_time
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.surface_kinks import bend_of, by_place, finish_corner
 from lathe_chatter.lathe.integrator.surface_met import look_up, nodes_on_grid, surface_on_grid
@@ -62,7 +62,7 @@ def take_plain_steps(
         step_matrix: The response to a whole step where its coordinates are coupled (2n, 2n).
         out: As in `stepper.advance`.
         row: The sample that is next.
-        block: Room (block.ROWS, LANES).
+        block: Room (step_block_layout.ROWS, LANES).
         moved: Room for the coordinates of a block (2n, LANES).
         began: Room for those at its start (2n,).
 

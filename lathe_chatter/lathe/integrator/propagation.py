@@ -23,7 +23,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator.lanes import (
+from lathe_chatter.lathe.integrator.simd_vectors import (
     LANES,
     after,
     fma,

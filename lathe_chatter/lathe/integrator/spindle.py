@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator.lanes import fma
+from lathe_chatter.lathe.integrator.simd_vectors import fma
 
 _NEWTON_STEPS = 20
 _NEARLY = 1e-8

@@ -15,11 +15,11 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import block as at
 from lathe_chatter.lathe.integrator import random_numbers, surface
 from lathe_chatter.lathe.integrator import state_layout as layout
+from lathe_chatter.lathe.integrator import step_block_layout as at
+from lathe_chatter.lathe.integrator.event_in_piece import Machine, Scratch
 from lathe_chatter.lathe.integrator.event_step import take_step
-from lathe_chatter.lathe.integrator.lanes import LANES
 from lathe_chatter.lathe.integrator.output_samples import (
     COLUMNS,
     add_runout,
@@ -28,8 +28,8 @@ from lathe_chatter.lathe.integrator.output_samples import (
     write_sample,
 )
 from lathe_chatter.lathe.integrator.plain_steps import take_plain_steps
-from lathe_chatter.lathe.integrator.power_series import Machine, Scratch
 from lathe_chatter.lathe.integrator.propagation import TERMS
+from lathe_chatter.lathe.integrator.simd_vectors import LANES
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope
 from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 

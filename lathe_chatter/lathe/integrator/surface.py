@@ -20,7 +20,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 
-# Rows: those of many nodes lie side by side, and are read and written together (lanes.py).
+# Rows: those of many nodes lie side by side, and are read and written together (simd_vectors.py).
 (
     PLACE,  # steps at the target speed, from the origin
     HEIGHT,  # S, m

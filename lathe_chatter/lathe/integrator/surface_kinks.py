@@ -11,7 +11,7 @@ from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
-from lathe_chatter.lathe.integrator.lanes import fma
+from lathe_chatter.lathe.integrator.simd_vectors import fma
 
 
 @compiled(inline=True, borrows=True, inner=True)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.band_judge import BandJudge
+from lathe_chatter.detection.band_detector import BandDetector
 from lathe_chatter.detection.detector_state import HOPS
 
 _SHARE, _GONE = 0.55, 0.3
@@ -35,7 +35,7 @@ _OTHER = 0.08
 """Part by which a line is another line: chatter keeps its frequency."""
 
 
-class LineWatch:
+class SteadyToneAlarm:
     """Looks for the line over the bands of a few judges, and raises the alarm of its band.
 
     Args:
@@ -44,7 +44,7 @@ class LineWatch:
         angle: Whether the spindle's angle is seen.
     """
 
-    def __init__(self, judges: Sequence[BandJudge], strictness: float, *, angle: bool) -> None:
+    def __init__(self, judges: Sequence[BandDetector], strictness: float, *, angle: bool) -> None:
         """Nothing found."""
         self._judges, self._angle = judges, angle
         self._strictness = strictness
@@ -100,7 +100,7 @@ class LineWatch:
         """Whether this is the frequency of the line that was found last."""
         return bool(abs(hertz - self._hertz) < _OTHER * hertz)
 
-    def _weigh(self, judge: BandJudge, place: int, share: float) -> None:
+    def _weigh(self, judge: BandDetector, place: int, share: float) -> None:
         """Raise the alarm where the loudest line, in a resonator of a judge, is chatter."""
         if share < _SHARE or not judge.line_known(place):
             self._found = 0

@@ -22,10 +22,10 @@ from lathe_chatter.detection.detector_state import (
     WINDOWS,
     new_state,
 )
-from lathe_chatter.detection.filters import Band, design, gain, pace_of, thinning_of
-from lathe_chatter.detection.hops import StreamFormat
+from lathe_chatter.detection.filter_design import Band, design, gain, pace_of, thinning_of
 from lathe_chatter.detection.machine_check import MachineFit, Verdict
 from lathe_chatter.detection.signal_conditioning import HOP_SUMS, SETTINGS, new_memory
+from lathe_chatter.detection.signal_framing import StreamFormat
 from lathe_chatter.detection.speed_adviser import Identified, SpeedAdviser
 from lathe_chatter.detection.structured_arrays import record
 from lathe_chatter.model import Machine
@@ -66,7 +66,7 @@ class Thresholds:
     slowest_turns: float
 
 
-class BandJudge:
+class BandDetector:
     """Judges what is heard in one band.
 
     Args:

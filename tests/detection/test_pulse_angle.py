@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lathe_chatter.detection.spindle import PulseAngle
+from lathe_chatter.detection.pulse_angle import PulseAngle
 
 RATE = 1e4
 TIME = np.arange(60_000) / RATE

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.lathe.integrator import lanes
-from lathe_chatter.lathe.integrator import lanes_in_python as plain
-from lathe_chatter.lathe.integrator.lanes import LANES
+from lathe_chatter.lathe.integrator import simd_vectors
+from lathe_chatter.lathe.integrator import simd_vectors_in_python as plain
+from lathe_chatter.lathe.integrator.simd_vectors import LANES
 
 
 def _made_of(own: Any) -> Callable[[Array, Array], tuple[int, int, float, float]]:
-    """A function that uses all of lanes.py, or of its double."""
+    """A function that uses all of simd_vectors.py, or of its double."""
 
     def everything(given: Array, out: Array) -> tuple[int, int, float, float]:
         x, y = own.lanes_at(given, 0, 1), own.lanes_at(given, 1, 2)
@@ -40,7 +40,7 @@ def _made_of(own: Any) -> Callable[[Array, Array], tuple[int, int, float, float]
     return everything
 
 
-_compiled, _all_of_it = numba.njit(_made_of(lanes)), _made_of(plain)
+_compiled, _all_of_it = numba.njit(_made_of(simd_vectors)), _made_of(plain)
 
 
 @pytest.mark.parametrize('seed', range(20))
@@ -56,8 +56,8 @@ def test_machine_code_and_numpy_agree(seed: int) -> None:
 
 @numba.njit  # type: ignore[untyped-decorator]  # Numba
 def _fused(a: float, b: float, c: float, out: Array) -> float:
-    lanes.put(out, 0, 0, lanes.fma(a, lanes.spread(b), c))
-    return lanes.fma(a, b, c)
+    simd_vectors.put(out, 0, 0, simd_vectors.fma(a, simd_vectors.spread(b), c))
+    return simd_vectors.fma(a, b, c)
 
 
 @pytest.mark.parametrize('seed', range(50))

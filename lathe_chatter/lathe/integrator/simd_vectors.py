@@ -7,7 +7,7 @@ it does not matter how a run is cut into blocks.
 `fma` is a b + c rounded once, by the processor or by the C library, with the same bits from both.
 
 These are LLVM's vectors, so nothing depends on what a compiler makes of a loop. What each function
-does stands in lanes_in_python.py.
+does stands in simd_vectors_in_python.py.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from lathe_chatter.lathe.integrator import lanes_in_python as plain
+from lathe_chatter.lathe.integrator import simd_vectors_in_python as plain
 
 LANES = plain.LANES
 _DOUBLE, _INT = ir.DoubleType(), ir.IntType(64)

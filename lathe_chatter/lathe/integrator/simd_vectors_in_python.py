@@ -1,4 +1,4 @@
-"""What lanes.py does, for NumPy arrays (8,): where Numba is switched off, in a debugger say."""
+"""What simd_vectors.py does, for NumPy arrays (8,): for a debugger, with Numba switched off."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.channel_watch import faults_of, new_channels, watch_channels
+from lathe_chatter.detection.pulse_angle import PulseAngle
 from lathe_chatter.detection.sensors_to_displacement import MotionFilter, Sensors, sensors_among
-from lathe_chatter.detection.spindle import PulseAngle
 from lathe_chatter.errors import LayoutError
 
 _TIME, _ANGLE, _PULSE = 'time', 'spindle_angle', 'spindle_pulse'

@@ -9,8 +9,8 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import piece_end as at
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.first_crossing import NEVER, first_crossing, may_turn_back
-from lathe_chatter.lathe.integrator.lanes import LANES, fma, lanes_at, put, spread
 from lathe_chatter.lathe.integrator.propagation import TERMS, WEIGHTS, quintic, solve_piece
+from lathe_chatter.lathe.integrator.simd_vectors import LANES, fma, lanes_at, put, spread
 from lathe_chatter.lathe.integrator.state_layout import (
     BEARING_V,
     BEARING_X,
@@ -46,7 +46,7 @@ class Scratch(NamedTuple):
     given: Array  # the surface met and the force of an unbalance (2, TERMS)
     forces: Array  # (6,)
     margin: Array  # of an event (1, TERMS + 1)
-    block: Array  # of plain steps (block.ROWS, LANES)
+    block: Array  # of plain steps (step_block_layout.ROWS, LANES)
     moved: Array  # the coordinates in it (2n, LANES)
 
 
