@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from lathe_chatter.scenario import Scenario, load_scenario
     from lathe_chatter.scenario.simulation import simulate
     from lathe_chatter.stability import (
+        ProcessDamping,
+        SpeedLaw,
         critical_depth,
         critical_depths,
         floquet,
@@ -57,10 +59,12 @@ __all__ = [
     'MachineDescription',
     'Mode',
     'ParameterError',
+    'ProcessDamping',
     'Run',
     'RunWriter',
     'Samples',
     'Scenario',
+    'SpeedLaw',
     'VirtualLathe',
     '__version__',
     'critical_depth',
@@ -105,8 +109,9 @@ _MODULES = {
     'scenario.simulation': ('simulate',),
     'stability.probability': ('stability_probability',),
     'stability': (
-        'critical_depth', 'critical_depths', 'floquet', 'growth_map', 'lobe_boundary',
-        'recommend_speeds', 'rightmost_root', 'rightmost_roots', 'safe_limit',
+        'ProcessDamping', 'SpeedLaw', 'critical_depth', 'critical_depths', 'floquet',
+        'growth_map', 'lobe_boundary', 'recommend_speeds', 'rightmost_root', 'rightmost_roots',
+        'safe_limit',
     ),
     'tap_test': ('fit_modes', 'read_frequency_responses'),
 }
@@ -128,4 +133,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*(name for name in globals() if name.startswith('__')), *__all__})

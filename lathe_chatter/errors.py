@@ -52,6 +52,17 @@ class ParameterError(LatheChatterError, ValueError):
         super().__init__(f'{name} is {shown}: it must be {allowed}.')
 
 
+class UnprovenError(LatheChatterError, ArithmeticError):
+    """A root or multiplier that could not be found for certain, and what to change."""
+
+    def __init__(self, what: str) -> None:
+        """Say what was looked for."""
+        super().__init__(
+            f'{what} could not be found for certain: two modes may all but coincide, so change '
+            'the frequency of one by 0.01 %, or the depths or speeds.'
+        )
+
+
 class LayoutError(LatheChatterError, ValueError):
     """A block of samples whose layout is not that of the contract."""
 

@@ -34,6 +34,13 @@ def test_every_name_is_there(name: str) -> None:
     assert getattr(lc, name) is getattr(lc, name)
 
 
+def test_dir_shows_the_names_of_the_table_and_no_tools() -> None:
+    call = 'import lathe_chatter as lc; lc.Cut; print(*dir(lc), sep="\\n")'
+    told = subprocess.run([sys.executable, '-c', call], check=True, capture_output=True, text=True)
+    shown = {name for name in told.stdout.split() if not name.startswith('__')}
+    assert shown | {'__version__'} == set(lc.__all__)
+
+
 def test_a_name_that_is_not_there_is_named() -> None:
     with pytest.raises(AttributeError, match="no attribute 'Lathe'"):
         _ = lc.Lathe

@@ -21,7 +21,7 @@ from lathe_chatter.cli.common_options import (
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
 from lathe_chatter.cli.worker_options import add_executor, executor_of
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, UnprovenError
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.model.quantity_fields import Quantity, limits_of
@@ -129,6 +129,9 @@ def run(options: Namespace) -> int:
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {kept}.')
         return INTERRUPTED
+    except UnprovenError:  # no other call would get further from there
+        kept.unlink(missing_ok=True)
+        raise
     with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
         draw_lobes(config.cut, limits, growth, top, options.output, probability=probability)

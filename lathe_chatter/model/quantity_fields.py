@@ -12,6 +12,8 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from enum import Enum
 from typing import Any
 
+import numpy as np
+
 from lathe_chatter.errors import ParameterError
 
 _KEY = 'quantity'
@@ -120,6 +122,17 @@ def check_choice(name: str, value: object, choices: type[Enum]) -> Any:
     except ValueError:
         allowed = ', '.join(str(choice.value) for choice in choices)
         raise ParameterError(name, value, '', f'one of {allowed}') from None
+
+
+def check_flag(name: str, value: object) -> bool:
+    """A truth, Python's or NumPy's: a text is none, 'no' would be taken as yes.
+
+    Raises:
+        ParameterError: If it is something else.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise ParameterError(name, value, '', 'True or False')
+    return bool(value)
 
 
 def count_of(name: str, value: object, *, least: int = 0) -> int:

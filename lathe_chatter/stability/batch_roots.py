@@ -43,7 +43,7 @@ def operating_points(
         tool_leaves_cut: Whether the force has a mean, see `safe_limit`; of all, or of each.
 
     Raises:
-        ArithmeticError: If a root could not be proven to be the rightmost.
+        UnprovenError: If a root could not be proven to be the rightmost.
     """
     root = np.full(len(cuts), complex(np.nan, np.nan))
     seated = np.zeros(len(cuts), np.bool_)

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Body, Cut, Machine
-from lathe_chatter.model.quantity_fields import Quantity, quantity_of
+from lathe_chatter.model.quantity_fields import Quantity, check_flag, quantity_of
 from lathe_chatter.stability.compiled_characteristic import (
     ALPHA,
     BETA,
@@ -90,7 +90,11 @@ def sections_of(machine: Machine, *, seated: bool, least_damping: float = 0.0) -
 
     Returns:
         alpha, beta, c and k of each mode (modes, SECTION_SIZE).
+
+    Raises:
+        ParameterError: If `seated` is no truth.
     """
+    seated = check_flag('seated', seated)
     sections = np.concatenate(
         (_free(machine.tool), _workpiece(machine, seated=seated)), dtype=float
     )

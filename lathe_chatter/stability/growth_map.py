@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.quantity_fields import check_choice
 from lathe_chatter.resumable_results import spread_into
 from lathe_chatter.stability.characteristic import ProcessDamping, checked
 from lathe_chatter.stability.periodic_map import SpeedLaw
@@ -48,7 +49,7 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     depth_of_cut: ArrayLike,
     *,
     tool_leaves_cut: bool = True,
-    law: SpeedLaw = SpeedLaw.SPEED,
+    law: SpeedLaw | str = SpeedLaw.SPEED,
     executor: Executor | None = None,
     kept_in: Path | None = None,
     progress: Callable[[int], object] = lambda _count: None,
@@ -62,15 +63,16 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
         spindle_speed_rpm: Speeds (n,), rev/min.
         depth_of_cut: Depths (m,), m.
         tool_leaves_cut: Whether the force has a mean, see `safe_limit`.
-        law: What swings where the speed is varied.
+        law: What swings where the speed is varied, `SpeedLaw` or its value, 'speed' or 'delay'.
         executor: Where it is computed, see `executors`; by default threads, one a core.
         kept_in: File that keeps what is computed, and is continued where it exists.
         progress: Is told, now and then, how many more points are known.
 
     Raises:
-        ParameterError: If a speed or depth is not allowed, or the answer would take minutes.
+        ParameterError: If a speed, depth or law is not allowed, or the answer would take minutes.
         ResultFileError: If the file is of something else, or cannot be written.
     """
+    law = check_choice('law', law, SpeedLaw)
     speeds = np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
     depths = np.atleast_1d(checked('depth_of_cut', depth_of_cut))
     line = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut).seating_line

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.errors import UnprovenError
 
 _CHECKED = 4
 """Steps after which it is looked whether the eigenvalue has settled."""
@@ -33,7 +34,7 @@ def dominant_eigenvalue(
         The eigenvalue, with imaginary part >= 0, and its eigenvector (size,).
 
     Raises:
-        ArithmeticError: If it does not settle.
+        UnprovenError: If it does not settle.
     """
     size = len(start)
     most = min(size, _MOST_STEPS)
@@ -61,7 +62,7 @@ def dominant_eigenvalue(
             basis = np.concatenate((basis, np.zeros_like(basis)))
         projected[k + 1, k] = rest
         basis[k + 1] = image / rest
-    raise ArithmeticError('the dominant multiplier does not settle')
+    raise UnprovenError('The dominant multiplier of the varied speed')
 
 
 def _square(vector: Array) -> float:

@@ -18,6 +18,7 @@ from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.quantity_fields import check_choice
 from lathe_chatter.stability.characteristic import ProcessDamping, sections_of
 from lathe_chatter.stability.compiled_characteristic import BETA, STIFFNESS
 
@@ -73,13 +74,20 @@ class Elements(NamedTuple):
 
 
 def divide(
-    machine: Machine, cut: Cut, deepest: float, law: SpeedLaw, refinement: int, *, seated: bool
+    machine: Machine,
+    cut: Cut,
+    deepest: float,
+    law: SpeedLaw | str,
+    refinement: int,
+    *,
+    seated: bool,
 ) -> Elements:
     """Elements short enough for the machine, rad/s, and for the shortest delay.
 
     Raises:
-        ParameterError: If there are more of them than anyone would wait for.
+        ParameterError: If there are more of them than anyone would wait for, or the law is none.
     """
+    law = check_choice('law', law, SpeedLaw)
     sections = sections_of(machine, seated=seated)
     coupled = machine.cutting_stiffness(deepest) * np.abs(sections[:, BETA]).sum()
     fastest = _HEADROOM * math.sqrt(float(sections[:, STIFFNESS].max() + coupled)) * refinement

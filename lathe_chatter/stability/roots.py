@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
+from lathe_chatter.errors import UnprovenError
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.characteristic import (
@@ -49,6 +50,8 @@ _LEFT, _TURNS = 36.0, 4.0
 """The dense search looks at -Re s tau up to the logarithm of rounding, in the first turns."""
 _NUDGE = 1e-8
 """Relative distance from a mode at which a search begins: at the mode itself D is 0 times inf."""
+_SHARED = 1e-11
+"""Relative distance of two poles within which Newton's method may miss the root between them."""
 _COUNT = Quantity('number of roots', low=1.0, high=10000.0)
 _NONE = complex(-math.inf, 0.0)
 
@@ -124,7 +127,7 @@ def rightmost_roots(
 
     Raises:
         ParameterError: If a speed or depth is not allowed.
-        ArithmeticError: If a root could not be proven to be the rightmost.
+        UnprovenError: If a root could not be proven to be the rightmost.
     """
     cuts = Cuts.of(machine, spindle_speed_rpm, depth_of_cut, seated=seated, process=process)
     roots = np.empty(cuts.delay.size, complex)
@@ -133,7 +136,11 @@ def rightmost_roots(
         proven, roots,
     )  # fmt: skip
     if np.isnan(roots).any():
-        raise ArithmeticError('the rightmost characteristic root could not be proven')
+        places = np.isnan(roots)
+        rpm, most = 60.0 / cuts.delay[places][0], int(places.sum())
+        raise UnprovenError(
+            f'The rightmost root of {most} of {roots.size} cuts, one at {rpm:.6g} rev/min,'
+        )
     return roots.reshape(cuts.shape)
 
 
@@ -161,7 +168,7 @@ def leading_roots(
 
     Raises:
         ParameterError: If an argument is not allowed.
-        ArithmeticError: If the roots found do not agree with their number.
+        UnprovenError: If the roots found do not agree with their number.
     """
     wanted = int(_COUNT.check('count', count))
     cuts = Cuts.of(machine, spindle_speed_rpm, depth_of_cut, seated=seated, process=process)
@@ -175,7 +182,7 @@ def leading_roots(
         expected = np.where(roots.imag > 0.0, 2, 1).sum()
         if count_right_of(cuts, np.array([roots[-1].real - margin]))[0] == expected:
             return roots
-    raise ArithmeticError('the characteristic roots found do not agree with their number')
+    raise UnprovenError(f'Each of the {wanted} leading roots')
 
 
 def _distinct(points: Complex, count: int) -> Complex:
@@ -251,6 +258,28 @@ def _pole(sections: Array, j: int) -> complex:
 
 
 @compiled(borrows=True, inner=True)
+def _shared_pole(sections: Array, modes: int) -> complex:
+    """The rightmost pole that two sections all but share, which is a root; -inf without one.
+
+    The force drives the two as one mode, and they can move against each other without any. D is 0
+    times inf there, so that Newton's method may not arrive. The root lies between the two, nearer
+    to the one that yields less to the force.
+    """
+    best = _NONE
+    for j in range(modes):
+        pole = _pole(sections, j)
+        for other in range(j):
+            apart = _pole(sections, other) - pole
+            if abs(apart.real) + abs(apart.imag) > _SHARED * abs(pole):
+                continue
+            both = sections[j, BETA] + sections[other, BETA]
+            root = pole + apart * (sections[j, BETA] / both) if both != 0.0 else pole
+            if root.real > best.real:
+                best = root
+    return best
+
+
+@compiled(borrows=True, inner=True)
 def _highest(sections: Array, modes: int, stiffness: float, damping: float, delay: float) -> float:
     """An angular frequency above which no root is of interest, rad/s."""
     natural, coupled = 0.0, 0.0
@@ -284,7 +313,7 @@ def _quick_search(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float
 ) -> complex:
     """The rightmost of the roots found from the modes, and from each half turn of the phase."""
-    best = _NONE
+    best = _shared_pole(sections, modes)
     for j in range(modes):
         for coupled in (0.0, 1.0):
             pole = _pole(sections, j)
@@ -341,8 +370,9 @@ def _arrived(
     sections: Array, modes: int, stiffness: float, damping: float, delay: float, seeds: Complex
 ) -> Complex:
     """The roots to which Newton's method goes from many points."""
-    roots = np.empty(len(seeds), np.complex128)
-    count = 0
+    roots = np.empty(len(seeds) + 1, np.complex128)
+    roots[0] = _shared_pole(sections, modes)
+    count = int(roots[0].real > -math.inf)
     for seed in seeds:
         root = _newton(
             sections, modes, stiffness, damping, delay, seed, _ITERATIONS_DENSE, math.inf

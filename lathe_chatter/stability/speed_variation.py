@@ -65,7 +65,7 @@ def floquet(
     cut: Cut,
     *,
     seated: bool,
-    law: SpeedLaw = SpeedLaw.SPEED,
+    law: SpeedLaw | str = SpeedLaw.SPEED,
     refinement: int = 1,
 ) -> Floquet:
     """The dominant multiplier of a cut whose spindle speed varies.
@@ -74,7 +74,7 @@ def floquet(
         machine: Tool, workpiece, bearing and material.
         cut: Mean speed, depth, amplitude and frequency of the variation.
         seated: Whether the workpiece rests on its bearing.
-        law: What swings.
+        law: What swings, `SpeedLaw` or its value, 'speed' or 'delay'.
         refinement: Divides the elements, to check a result.
 
     Returns:
@@ -82,7 +82,7 @@ def floquet(
 
     Raises:
         ParameterError: If the variation is so slow, or the machine so fast, that the answer
-            would take minutes.
+            would take minutes; if the law is none.
     """
     elements = divide(machine, cut, cut.depth_of_cut, law, refinement, seated=seated)
     return _multiplier(machine, cut, elements, seated=seated)
@@ -95,7 +95,7 @@ def varied_growth_rates(  # noqa: PLR0913 -- a chart and its law
     depth_of_cut: ArrayLike,
     *,
     seated: bool,
-    law: SpeedLaw = SpeedLaw.SPEED,
+    law: SpeedLaw | str = SpeedLaw.SPEED,
 ) -> Array:
     """A stability chart under speed variation.
 
@@ -105,7 +105,7 @@ def varied_growth_rates(  # noqa: PLR0913 -- a chart and its law
         spindle_speed_rpm: Mean spindle speeds (n,), rev/min.
         depth_of_cut: Depths w (m,), m.
         seated: Whether the workpiece rests on its bearing.
-        law: What swings.
+        law: What swings, `SpeedLaw` or its value, 'speed' or 'delay'.
 
     Returns:
         Growth rates (m, n), 1/s.

@@ -13,6 +13,7 @@ import pytest
 
 from lathe_chatter.cli import lobes
 from lathe_chatter.cli import main as cli
+from lathe_chatter.errors import UnprovenError
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.stability import rightmost_root, safe_limit
 
@@ -254,3 +255,27 @@ def test_an_interrupted_chart_goes_on_where_it_was(
     # Of the probability one more call is of the cut itself, a thousand machines at its speed.
     assert len(begun) - end == (columns or 1100) - kept
     assert not (tmp_path / 'a.jsonl').exists()
+
+
+def test_a_map_that_fails_is_a_sentence_and_leaves_nothing_in_the_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failing(*_values: object, **_options: object) -> object:
+        raise UnprovenError('The rightmost root')
+
+    call = [
+        'lobes',
+        '--map',
+        '--from',
+        '2000',
+        '--to',
+        '2100',
+        '--output',
+        str(tmp_path / 'a.png'),
+    ]
+    with monkeypatch.context() as patch:
+        patch.setattr(import_module('lathe_chatter.stability.growth_map'), '_growth', failing)
+        assert cli.main(call) == 2
+    assert 'change the frequency of one by' in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+    assert cli.main([*call, '--tool.mass', '0.06']) == 0

@@ -7,7 +7,14 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.stability import contact_at, floquet, growth_map, rightmost_root, safe_limit
+from lathe_chatter.stability import (
+    SpeedLaw,
+    contact_at,
+    floquet,
+    growth_map,
+    rightmost_root,
+    safe_limit,
+)
 
 MACHINE = Machine()
 SPEEDS, DEPTHS = np.linspace(2000.0, 6000.0, 9), np.linspace(0.2e-3, 1.2e-3, 6)
@@ -53,3 +60,13 @@ def test_with_a_varying_speed_each_point_is_a_multiplier() -> None:
 def test_a_speed_that_no_spindle_has_is_refused() -> None:
     with pytest.raises(ParameterError, match=r'spindle_speed_rpm is 0\.5'):
         growth_map(MACHINE, Cut(), [0.5], [1e-3])
+
+
+def test_a_law_may_be_a_text_and_one_that_is_none_is_refused() -> None:
+    cut = Cut(speed_variation_amplitude=0.2, speed_variation_frequency=20.0)
+    told = growth_map(MACHINE, cut, 3000.0, 5e-4, law='delay')
+    assert told.law is SpeedLaw.DELAY
+    assert told == growth_map(MACHINE, cut, 3000.0, 5e-4, law=SpeedLaw.DELAY)
+    for varied in (cut, Cut()):
+        with pytest.raises(ParameterError, match="law is 'rubbish': it must be one of speed, del"):
+            growth_map(MACHINE, varied, 3000.0, 5e-4, law='rubbish')

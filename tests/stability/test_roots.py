@@ -5,7 +5,7 @@ import pytest
 from support.machines import random_machine
 from support.reference import collocation
 
-from lathe_chatter.errors import ParameterError
+from lathe_chatter.errors import ParameterError, UnprovenError
 from lathe_chatter.model import Machine, Mode
 from lathe_chatter.stability import (
     count_roots_right_of,
@@ -102,6 +102,38 @@ def test_two_equal_modes_give_a_double_root() -> None:
     root = rightmost_root(Machine(mode, mode), 3000.0, 0.0, seated=False)
     # A double root is known to the square root of rounding.
     assert root == pytest.approx(complex(-35.0, 700.0 * np.sqrt(1 - 0.05**2)), abs=1e-3)
+
+
+@pytest.mark.parametrize('apart', [0.0, 1e-12])
+@pytest.mark.parametrize('ratio', [1.0, 1e2, 1e5])
+def test_two_modes_of_one_frequency_and_damping_keep_a_root_that_no_force_moves(
+    ratio: float, apart: float
+) -> None:
+    """They cut as one mode of both flexibilities, and move against each other without force."""
+    omega, zeta = 2.0 * np.pi * 200.0, 0.02
+    tool = Mode(1e7 / omega**2, omega, zeta)
+    stiff = Mode(ratio * 1e7 / omega**2, omega * (1.0 + apart), zeta)
+    both = Machine(tool, stiff, 0.0, 1.5e9)
+    one = Mode(1e7 / (1.0 + 1.0 / ratio) / omega**2, omega, zeta)
+    alone = Machine(one, Mode(1e6, 10.0 * omega, 1.0), 0.0, 1.5e9)
+    still = complex(-zeta, np.sqrt(1.0 - zeta**2)) * omega
+    speeds, depths = np.linspace(1900.0, 23000.0, 40), np.linspace(2.5e-5, 5e-4, 20)[:, None]
+    found = rightmost_roots(both, speeds, depths, seated=False)
+    expected = rightmost_roots(alone, speeds, depths, seated=False)
+    expected = np.where(expected.real > still.real, expected, still)
+    assert (expected == still).any()
+    assert (expected != still).any()
+    assert found == pytest.approx(expected, rel=1e-6)
+    first = leading_roots(both, 1900.0, 2.5e-5, seated=False, count=2)
+    assert np.abs(first - still).min() < 1e-9 * omega
+
+
+def test_roots_that_cannot_be_told_apart_are_a_sentence() -> None:
+    """Three modes of one frequency: two of the roots are one."""
+    three = Machine([Mode(0.05, 775.0, 0.05)] * 3, Mode(0.05, 650.0, 0.05))
+    with pytest.raises(UnprovenError, match='change the frequency of one by') as told:
+        leading_roots(three, 3000.0, 5e-4, seated=False)
+    assert isinstance(told.value, ArithmeticError)
 
 
 def test_an_undamped_machine_out_of_the_cut_neither_grows_nor_decays() -> None:

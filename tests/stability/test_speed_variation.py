@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,11 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import (
+    SpeedLaw,
+    critical_depth,
     floquet,
+    lobe_boundary,
+    recommend_speeds,
     rightmost_root,
     varied_growth_rates,
 )
@@ -115,3 +121,28 @@ def test_a_chart_holds_the_growth_rate_of_each_point() -> None:
 def test_a_chart_of_an_impossible_depth_is_refused() -> None:
     with pytest.raises(ParameterError, match='depth_of_cut'):
         varied_growth_rates(Machine(), Cut(), [3000.0], [-1.0], seated=False)
+
+
+def test_a_law_may_be_a_text_and_one_that_is_none_is_refused() -> None:
+    cut = _cut(3000.0, 8e-4, 0.2, 20.0)
+    rates = {law: floquet(Machine(), cut, seated=False, law=law).growth_rate for law in SpeedLaw}
+    assert abs(rates[SpeedLaw.SPEED] - rates[SpeedLaw.DELAY]) > 0.1
+    for law, rate in rates.items():
+        assert floquet(Machine(), cut, seated=False, law=law.value).growth_rate == rate
+        varied = varied_growth_rates(Machine(), cut, 3000.0, 8e-4, seated=False, law=law.value)
+        assert varied.item() == pytest.approx(rate, abs=1e-6)
+    with pytest.raises(ParameterError, match="law is 'rubbish': it must be one of speed, delay"):
+        floquet(Machine(), cut, seated=False, law='rubbish')
+
+
+@pytest.mark.parametrize('call', [floquet, varied_growth_rates, critical_depth, rightmost_root,
+                                  lobe_boundary, recommend_speeds])  # fmt: skip
+def test_a_text_for_seated_is_refused(call: Callable[..., object]) -> None:
+    """`'no'` would be taken as yes."""
+    cut = _cut(3000.0, 8e-4, 0.2, 20.0)
+    given: dict[Callable[..., object], tuple[object, ...]] = {
+        floquet: (cut,), varied_growth_rates: (cut, 3000.0, 8e-4), critical_depth: (3000.0,),
+        rightmost_root: (3000.0, 8e-4), lobe_boundary: (), recommend_speeds: (5e-4,),
+    }  # fmt: skip
+    with pytest.raises(ParameterError, match="seated is 'no': it must be True or False"):
+        call(Machine(), *given[call], seated='no')
