@@ -117,21 +117,14 @@ def run(options: Namespace) -> int:
     top = _DEPTH.check('--depth-limit', top)
     screen = Screen(json=options.json)
     kept = options.output.with_suffix('.jsonl')
-    growth, probability = None, None
     known = _uncertainty(options, config)
     try:
         with executor_of(options, screen) as executor:
             wide = _Wide(screen, executor, kept)
-            if options.map or config.cut.speed_variation_amplitude > 0.0:
-                growth = _map(config, low, high, top, SpeedLaw(options.law), wide)
-            elif known:
-                probability = _probability(config, known, limits, wide)
+            growth, probability = _coloured(options, config, limits, (low, high, top), wide)
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {kept}.')
         return INTERRUPTED
-    except UnprovenError:  # no other call would get further from there
-        kept.unlink(missing_ok=True)
-        raise
     with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
         draw_lobes(config.cut, limits, growth, top, options.output, probability=probability)
@@ -170,6 +163,21 @@ class _Wide(NamedTuple):
     screen: Screen
     executor: Executor
     kept: Path
+
+
+def _coloured(
+    options: Namespace, config: LatheConfig, limits: SafeLimit,
+    span: tuple[float, float, float], wide: _Wide,
+) -> tuple[GrowthMap | None, StabilityProbability | None]:  # fmt: skip
+    """What the chart is coloured with: growth rates, a probability, or nothing."""
+    known = _uncertainty(options, config)
+    try:
+        if options.map or config.cut.speed_variation_amplitude > 0.0:
+            return _map(config, *span, SpeedLaw(options.law), wide), None
+        return None, _probability(config, known, limits, wide) if known else None
+    except UnprovenError:  # no other call would get further from there
+        wide.kept.unlink(missing_ok=True)
+        raise
 
 
 def _map(  # noqa: PLR0913, PLR0917 -- what is drawn, and where

@@ -72,15 +72,19 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
         ParameterError: If a speed, depth or law is not allowed, or the answer would take minutes.
         ResultFileError: If the file is of something else, or cannot be written.
     """
-    law = check_choice('law', law, SpeedLaw)
+    swings: SpeedLaw = check_choice('law', law, SpeedLaw)
     speeds = np.atleast_1d(checked('spindle_speed_rpm', spindle_speed_rpm))
     depths = np.atleast_1d(checked('depth_of_cut', depth_of_cut))
     line = safe_limit(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut).seating_line
     rests: NDArray[np.bool_] = depths[:, None] >= line
-    column = partial(_column, machine, cut, law, depths)
+    column = partial(_column, machine, cut, swings, depths)
     columns = spread_into(
         kept_in,
-        {'kind': 'growth rates', 'cut': repr((machine, cut, law.value)), 'depths': depths.tolist()}
+        {
+            'kind': 'growth rates',
+            'cut': repr((machine, cut, swings.value)),
+            'depths': depths.tolist(),
+        }
         | {'speeds': speeds.tolist(), 'rests': rests.tolist()},
         column,
         list(zip(speeds.tolist(), rests.T.tolist(), strict=True)),
@@ -88,7 +92,7 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
         progress=lambda count: progress(count * depths.size),
     )
     growth = np.array(columns, float).reshape(speeds.size, depths.size).T
-    return GrowthMap(speeds, depths, growth, rests, law)
+    return GrowthMap(speeds, depths, growth, rests, swings)
 
 
 def _column(
