@@ -192,7 +192,9 @@ def spectrum(time: Array, signal: Array) -> Spectrum:
 def once_per_turn(time: Array, angle: Array, displacement: Array, velocity: Array) -> Section:
     """Displacement and velocity at every whole turn of the spindle.
 
-    Between two samples the motion is the cubic that has their displacements and velocities.
+    Between two samples the displacement is the cubic that has their displacements and velocities,
+    the velocity that through the two velocities on either side: taken from displacements it
+    would have the noise of their sensor over the step between two samples.
 
     Args:
         time: s (n,).
@@ -207,9 +209,13 @@ def once_per_turn(time: Array, angle: Array, displacement: Array, velocity: Arra
     x, y = displacement[k], displacement[k + 1]
     u, v = step * velocity[k], step * velocity[k + 1]
     bend, twist = 3.0 * (y - x) - 2.0 * u - v, 2.0 * (x - y) + u + v
-    place = x + s * (u + s * (bend + s * twist))
-    slope = u + s * (2.0 * bend + s * 3.0 * twist)
-    return Section(place, slope / step)
+    ends = 2.0 * velocity[:1] - velocity[1:2], 2.0 * velocity[-1:] - velocity[-2:-1]
+    wide = np.concatenate([ends[0], velocity, ends[1]])
+    p, q = s * (s - 1.0), (s + 1.0) * (s - 2.0)
+    between = (
+        (s + 1.0) * p * wide[k + 3] - (s - 2.0) * p * wide[k]
+    ) / 6.0 + 0.5 * q * ((s - 1.0) * velocity[k] - s * velocity[k + 1])
+    return Section(x + s * (u + s * (bend + s * twist)), between)
 
 
 def _share(those: NDArray[np.bool_]) -> float:

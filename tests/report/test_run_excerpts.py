@@ -49,3 +49,17 @@ def test_what_repeats_with_the_spindle_is_a_point() -> None:
     assert section.displacement.size == 100
     assert np.abs(section.displacement).max() < 1e-6
     assert section.velocity == pytest.approx(np.full(100, 2.0 * rate), rel=1e-6)
+
+
+def test_noise_of_a_displacement_is_no_velocity() -> None:
+    """0.05 um at 20 kHz over one step are 1 mm/s; the velocity that was measured is none."""
+    time = np.arange(40_000) / 2e4
+    angle, still = 50.0 * time + 0.123, np.full(time.size, 1e-9)
+    noise = np.random.default_rng(5).normal(0.0, 5e-8, time.size)
+    section = once_per_turn(time, angle, 2e-6 + noise, still)
+    assert section.velocity == pytest.approx(still[: section.velocity.size], rel=1e-9)
+    assert np.abs(section.displacement - 2e-6).max() < 3e-7
+    few = once_per_turn(time[:1], angle[:1], still[:1], still[:1])
+    assert few.velocity.size == few.displacement.size == 0
+    two = once_per_turn(time[:2], np.array([0.9, 1.1]), still[:2], np.array([1.0, 3.0]))
+    assert two.velocity == pytest.approx([2.0])
