@@ -239,3 +239,8 @@ def writing(path: Path) -> Iterator[None]:
         # A full disk does not say which file it refuses.
         place = error.filename or path
         raise OutputError(f'{place} cannot be written: {reason_of(error)}.') from None
+
+
+def counted(count: int, word: str) -> str:
+    """A number of things, in words."""
+    return f'{count} {word}' if count == 1 else f'{count} {word}s'

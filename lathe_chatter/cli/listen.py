@@ -8,10 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 
 from lathe_chatter.cli.common_options import add_force, add_json, in_unit, picture_file
-from lathe_chatter.cli.console import Screen, keep_existing, writing
+from lathe_chatter.cli.console import Screen, counted, keep_existing, writing
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.filter_design import UNKNOWN_MACHINE
 from lathe_chatter.detection.sensors_to_displacement import sensors_among
+from lathe_chatter.detection.speed_adviser import speeds_to_recommend
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import Judged, Score, judge, read_signals, score
 from lathe_chatter.listening.detector_score import read_labels
@@ -76,9 +77,10 @@ def run(options: Namespace) -> int:
             f'{options.recording} has the columns {", ".join(signals.columns)}: none of them is a '
             'sensor by its name; --columns says what they are.'
         )
-    machine = None if options.machine is None else load_machine(options.machine).machine
+    described = None if options.machine is None else load_machine(options.machine)
     detector = ChatterDetector(
-        machine,
+        described.machine if described else None,
+        speed_range=speeds_to_recommend(described.speed_range if described else None),
         lowest_frequency=_FREQUENCY.check('--lowest-frequency', options.lowest_frequency),
         highest_frequency=_FREQUENCY.check('--highest-frequency', options.highest_frequency),
         nominal_rpm=_SPEED.check('--spindle-speed-rpm', options.spindle_speed_rpm),
@@ -103,7 +105,7 @@ def run(options: Namespace) -> int:
                     'time': each.time, 'state': each.state, 'chatter': each.chatter,
                     'frequency': each.frequency, 'growth_rate': each.growth_rate,
                 }
-                for each in judged.changes()
+                for each in judged.spells()
             ],
             'flagged_share': float(judged.flagged.mean()),
             'score': None if found is None else asdict(found),
@@ -120,7 +122,7 @@ def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
             _known(each.frequency, '.1f'),
             _known(each.growth_rate, '+.2f'),
         )
-        for each in judged.changes()
+        for each in judged.spells()
     ]
     titles = {
         'from / s': 'right',
@@ -131,14 +133,29 @@ def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
     screen.table(titles, rows)
     screen.say(f'works with  {judged.estimates[-1].mode.value}')
     screen.say(f'flagged     {judged.flagged.mean():.1%} of the time')
+    lines = [each for each in judged.spells() if each.chatter and math.isfinite(each.frequency)]
+    if lines and not judged.estimates[-1].mode.sees_spindle:
+        hertz = ', '.join(dict.fromkeys(f'{each.frequency:.1f}' for each in lines))
+        screen.say(
+            f'Without a spindle speed any line that holds the power is flagged: it stands at '
+            f'{hertz} Hz. If that is a multiple of the turns a second it is the spindle, not '
+            'chatter: --spindle-speed-rpm tells them apart.'
+        )
     if found is not None:
         delay = 'none' if math.isnan(found.delay) else f'{found.delay:.2f} s (median)'
         screen.say(
             f'labels      F1 of seconds {_known(found.f1, ".3f") or "none: no chatter in them"}, '
             f'of events {_known(found.event_f1, ".3f") or "none"} ({found.found} of '
-            f'{found.events}), delay {delay}, {found.false_alarms} false alarms in '
-            f'{found.quiet_hours:.3g} quiet hours'
+            f'{found.events}), delay {delay}, {counted(found.false_alarms, "false alarm")} in '
+            f'{_duration(3600.0 * found.quiet_hours)} without chatter'
         )
+
+
+def _duration(seconds: float) -> str:
+    """In the largest unit of which there is one at least."""
+    units = (('h', 3600.0), ('min', 60.0), ('s', 0.0))
+    unit, size = next(each for each in units if seconds >= each[1])
+    return f'{seconds / (size or 1.0):.3g} {unit}'
 
 
 def _known(value: float, form: str) -> str:

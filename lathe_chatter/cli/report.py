@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from lathe_chatter.cli.common_options import add_json, add_run
-from lathe_chatter.cli.console import Screen, writing
+from lathe_chatter.cli.console import Screen, counted, writing
 from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.plot_style import text_of
@@ -63,7 +63,8 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
     screen.table(titles, rows)
     screen.say(
         'Pairs: frequency / Hz and growth rate / (1/s) of the chatter as the monitor measured '
-        'them, and of the rightmost characteristic root, of the machine open and on its bearing.'
+        'them, medians over the time of the flag, and of the rightmost characteristic root, of '
+        'the machine open and on its bearing.'
     )
     if not any(series.size for series in history.estimates.values()):
         screen.say('No figure of a monitor is in the record.')
@@ -103,13 +104,13 @@ def _gap_sentences(history: History) -> Iterator[str]:
     if gaps:
         before, after = max(gaps, key=lambda gap: gap[1] - gap[0])
         yield (
-            f'Samples are missing in {_counted(len(gaps), "place")}, the longest from '
+            f'Samples are missing in {counted(len(gaps), "place")}, the longest from '
             f'{before:.6f} s to {after:.6f} s: lines end there, and nothing is '
             'computed across them.'
         )
     if history.later_sessions:
         yield (
-            f'The simulated time went back to zero {_counted(len(history.later_sessions), "time")}'
+            f'The simulated time went back to zero {counted(len(history.later_sessions), "time")}'
             ': here the times go on, from one cut to the next.'
         )
 
@@ -136,10 +137,6 @@ def _pair(frequency: float | None, growth_rate: float | None) -> str:
     return f'{frequency:.1f}  {growth_rate:+7.2f}'
 
 
-def _counted(count: int, word: str) -> str:
-    return f'{count} {word}' if count == 1 else f'{count} {word}s'
-
-
 def _occurrences(history: History) -> list[dict[str, Any]]:
     """Start, changes, flags, advice and end, in order of time."""
     # The start itself has no sample.
@@ -160,10 +157,14 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
         _entry(history, knock.time, f'knock, {text_of(knock.impulse, "N s")}')
         for knock in history.knocks
     ]
+    spans = history.chatter_spans()
     for flag in history.flags:
         entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
         if flag.chatter:
-            entry |= {'frequency': flag.frequency, 'growth_rate': flag.growth_rate}
+            until = next((end for start, end in spans if start == flag.time), flag.time)
+            for name in ('frequency', 'growth_rate'):
+                settled = history.settled(name, flag.time, until)
+                entry[name] = settled if math.isfinite(settled) else getattr(flag, name)
         result.append(entry)
     result += [
         _entry(history, time, f'advice: {speed:.0f} rev/min') for time, speed in _advice(history)

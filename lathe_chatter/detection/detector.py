@@ -23,7 +23,7 @@ from lathe_chatter.detection.filter_design import (
     bands_of,
 )
 from lathe_chatter.detection.signal_framing import Discontinuity, Framer, HopBlock, StreamFormat
-from lathe_chatter.detection.speed_adviser import SpeedAdviser
+from lathe_chatter.detection.speed_adviser import SPEEDS, SpeedAdviser
 from lathe_chatter.detection.steady_tone_alarm import SteadyToneAlarm
 from lathe_chatter.detection.structured_arrays import values_of
 from lathe_chatter.errors import ParameterError
@@ -67,7 +67,7 @@ class ChatterDetector:
         self,
         machine: Machine | None = _PAPER,
         *,
-        speed_range: tuple[float, float] = (60.0, 30000.0),
+        speed_range: tuple[float, float] = SPEEDS,
         smallest_amplitude: float = 1e-10,
         forced_amplitude: float = 10e-6,
         strictness: float = 1.0,

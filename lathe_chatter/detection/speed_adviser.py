@@ -9,7 +9,10 @@ from typing import NamedTuple
 
 from lathe_chatter.detection.speed_advice import ANOTHER_SPEED, Advice, advise, rule_of_thumb
 from lathe_chatter.model import Machine
+from lathe_chatter.model.machine_file import narrowed
 
+SPEEDS = (60.0, 30_000.0)
+"""Slowest and fastest speed to recommend where nothing else is said, rev/min."""
 _ADVISED_AT = (0, 2, 4, 7, 10, 15, 20, 30)
 """Hops after the alarm, and after a change of speed that was no cure, at which a speed is
 recommended, each time from a better estimate."""
@@ -17,6 +20,11 @@ _CLEAR_CONTACT = 0.15
 """Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
 _VAGUE = 10.0
 """Standard error of the growth rate from which on nothing is recommended, 1/s."""
+
+
+def speeds_to_recommend(spindle: tuple[float, float] | None) -> tuple[float, float]:
+    """The usual ones that a spindle has too, rev/min; its own where it has none of those."""
+    return narrowed(SPEEDS, spindle) or spindle or SPEEDS
 
 
 class Identified(NamedTuple):

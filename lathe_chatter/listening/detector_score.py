@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.detection.estimate import STATES
 from lathe_chatter.errors import SignalFileError, reason_of
 from lathe_chatter.listening.signal_file import Signals
 
@@ -22,6 +24,25 @@ _BLOCK = 0.02
 _LATE = 0.5
 """s within which a flag belongs to the chatter that began before it."""
 CHATTER = 'chatter'
+_HEAD = ['start', 'end', 'state']
+
+
+class Spell(NamedTuple):
+    """A time in which the state was one.
+
+    Attributes:
+        time: Of its first estimate, s.
+        state: As in `Estimate`.
+        chatter: Whether it was flagged at first.
+        frequency: Median of its estimates, Hz; the first ones may be far off. Nan without any.
+        growth_rate: Likewise, 1/s.
+    """
+
+    time: float
+    state: str
+    chatter: bool
+    frequency: float
+    growth_rate: float
 
 
 @dataclass(frozen=True)
@@ -40,13 +61,21 @@ class Judged:
         """Whether chatter is flagged (n,)."""
         return np.array([each.chatter for each in self.estimates], bool)
 
-    def changes(self) -> list[Estimate]:
-        """The first estimate of every state, in order."""
-        found: list[Estimate] = []
-        for each in self.estimates:
-            if math.isfinite(each.time) and (not found or found[-1].state != each.state):
-                found.append(each)
+    def spells(self) -> list[Spell]:
+        """The states in order."""
+        timed = (each for each in self.estimates if math.isfinite(each.time))
+        found = []
+        for state, each in itertools.groupby(timed, lambda estimate: estimate.state):
+            inside = list(each)
+            figures = (_settled(inside, name) for name in ('frequency', 'growth_rate'))
+            found.append(Spell(inside[0].time, state, inside[0].chatter, *figures))
         return found
+
+
+def _settled(estimates: Sequence[Estimate], name: str) -> float:
+    values = [getattr(each, name) for each in estimates]
+    known = [value for value in values if math.isfinite(value)]
+    return float(np.median(known)) if known else math.nan
 
 
 def judge(
@@ -83,10 +112,10 @@ class Label(NamedTuple):
 
 
 def read_labels(path: Path) -> list[Label]:
-    """Read a CSV of rows `start,end,state`; a first line of names is passed over.
+    """Read a CSV of rows `start,end,state`, the state as in `Estimate`; it may have that head.
 
     Raises:
-        SignalFileError: If it is none.
+        SignalFileError: If it is none, or no state in it is one that is known.
     """
     found = []
     try:
@@ -98,16 +127,24 @@ def read_labels(path: Path) -> list[Label]:
         try:
             label = Label(float(row[0]), float(row[1]), row[2].strip())
         except (IndexError, ValueError):
-            if number == 1:
+            if number == 1 and [name.strip().lower() for name in row] == _HEAD:
                 continue
+            head = ', or the head start,end,state' if number == 1 else ''
             raise SignalFileError(
-                f'{path}, row {number} is {",".join(row)}: it must be start (s), end (s), state.'
+                f'{path}, row {number} is {",".join(row)}: it must be start (s), end (s), '
+                f'state{head}.'
             ) from None
         if not label.start < label.end:
             raise SignalFileError(
                 f'{path}, row {number}: {label.start:g} s is not before its end.'
             )
         found.append(label)
+    if not any(label.state in STATES for label in found):
+        said = ', '.join(sorted({repr(label.state) for label in found}))
+        raise SignalFileError(
+            f'{path} has {f"only the states {said}" if said else "no rows"}: one at least must '
+            f'be one of {", ".join(STATES)}.'
+        )
     return found
 
 
@@ -158,17 +195,19 @@ def score_of(times: Array, flagged: NDArray[np.bool_], labels: Sequence[Label]) 
                 delays.append(float(raised[0]) - label.start)
     rises = np.flatnonzero(flagged & ~np.r_[False, flagged[:-1]])
     near = [any(label.start <= times[k] <= label.end + _LATE for label in events) for k in rises]
-    period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    steps = np.diff(times)
+    fresh = np.r_[True, steps > 0.0][: len(times)]  # blocks shorter than a hop repeat an estimate
+    period = float(np.median(steps[steps > 0.0])) if fresh.sum() > 1 else 0.0
     false = int(np.sum(labelled[rises] & ~np.array(near, bool))) if len(rises) else 0
     return Score(
         f1_of(int(np.sum(flagged & chatter)), int(np.sum((flagged != chatter) & labelled))),
         f1_of(len(delays), len(events) - len(delays) + false),
-        float(labelled.sum()) * period,
+        float((labelled & fresh).sum()) * period,
         len(events),
         len(delays),
         float(np.median(delays)) if delays else math.nan,
         false,
-        float((labelled & ~chatter).sum()) * period / 3600.0,
+        float((labelled & ~chatter & fresh).sum()) * period / 3600.0,
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from lathe_chatter.detection.speed_adviser import SPEEDS
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Cut
 from lathe_chatter.model.lathe_parameter_table import (
@@ -70,8 +71,8 @@ MONITOR = ParameterTable(
         ),
         MACHINE_FILE,
         *MACHINE_ROWS,
-        Row('slowest_speed', 60.0, 'slowest spindle speed to recommend', _ADVISED),
-        Row('fastest_speed', 30000.0, 'fastest spindle speed to recommend', _ADVISED),
+        Row('slowest_speed', SPEEDS[0], 'slowest spindle speed to recommend', _ADVISED),
+        Row('fastest_speed', SPEEDS[1], 'fastest spindle speed to recommend', _ADVISED),
         Row(
             'lowest_frequency',
             0.0,

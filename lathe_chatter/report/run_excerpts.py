@@ -212,10 +212,9 @@ def once_per_turn(time: Array, angle: Array, displacement: Array, velocity: Arra
     ends = 2.0 * velocity[:1] - velocity[1:2], 2.0 * velocity[-1:] - velocity[-2:-1]
     wide = np.concatenate([ends[0], velocity, ends[1]])
     p, q = s * (s - 1.0), (s + 1.0) * (s - 2.0)
-    between = (
-        (s + 1.0) * p * wide[k + 3] - (s - 2.0) * p * wide[k]
-    ) / 6.0 + 0.5 * q * ((s - 1.0) * velocity[k] - s * velocity[k + 1])
-    return Section(x + s * (u + s * (bend + s * twist)), between)
+    inner = 0.5 * q * ((s - 1.0) * velocity[k] - s * velocity[k + 1])
+    outer = p * ((s + 1.0) * wide[k + 3] - (s - 2.0) * wide[k]) / 6.0
+    return Section(x + s * (u + s * (bend + s * twist)), inner + outer)
 
 
 def _share(those: NDArray[np.bool_]) -> float:

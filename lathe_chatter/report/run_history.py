@@ -194,6 +194,12 @@ class History:
         """Simulated time of the last sample, s."""
         return self.samples.last
 
+    def settled(self, name: str, start: float, end: float) -> float:
+        """Median of an estimate between two times, s: the first ones may be far off."""
+        time, values = self.estimates.get(name, np.zeros((2, 0)))
+        inside = values[(time >= start) & (time < end) & np.isfinite(values)]
+        return float(np.median(inside)) if inside.size else math.nan
+
     def chatter_spans(self) -> list[tuple[float, float]]:
         """When the flag was up: from and to, s."""
         spans: list[tuple[float, float]] = []

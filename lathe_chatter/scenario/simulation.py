@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
+from lathe_chatter.detection.speed_adviser import speeds_to_recommend
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.lathe.cut_event_sentences import (
@@ -111,9 +112,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
 def _detector_for(config: LatheConfig, scenario: Scenario) -> ChatterDetector:
     """One that knows the machine, and recommends what its spindle can."""
     described = described_by(scenario.parameters)
-    if described is None:
-        return ChatterDetector(config.machine)
-    speeds = described.slowest_speed, described.fastest_speed
+    speeds = speeds_to_recommend(described.speed_range if described else None)
     return ChatterDetector(config.machine, speed_range=speeds)
 
 

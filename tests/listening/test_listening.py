@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,55 @@ def test_what_cannot_be_listened_to_is_one_sentence(
         path.write_text(text)
     with pytest.raises(SignalFileError, match=said):
         read_signals(path)
+
+
+def test_a_spell_has_the_settled_figures_not_the_first() -> None:
+    first = Estimate(1.0, 'chatter', chatter=True, frequency=1001.8, growth_rate=20.9)
+    later = [Estimate(1.0 + k / 50, 'chatter', frequency=207.0) for k in range(1, 9)]
+    spells = Judged((Estimate(0.5, 'stable'), first, *later, Estimate(2.0, 'stable'))).spells()
+    assert [(each.time, each.state) for each in spells] == [
+        (0.5, 'stable'), (1.0, 'chatter'), (2.0, 'stable'),
+    ]  # fmt: skip
+    assert spells[1].frequency == 207.0
+    assert np.isnan(spells[0].frequency)
+
+
+def test_a_tone_is_told_with_its_frequency_and_is_no_chatter_of_a_spindle_that_has_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """300 Hz amid noise, which is twice a turn at 9000 rev/min."""
+    time = np.arange(60_000) / 1e4
+    noise = np.random.default_rng(8).normal(0.0, 0.03, time.size)
+    path, labels = tmp_path / 'tone.wav', tmp_path / 'labels.csv'
+    signal = 0.5 * np.sin(2.0 * np.pi * 300.0 * time) + noise
+    wavfile.write(path, 10_000, (32_000 * signal).astype(np.int16))
+    labels.write_text('start,end,state\n0,4,stable\n')
+    assert main(['listen', str(path), '--labels', str(labels)]) == 0
+    said = ' '.join(capsys.readouterr().out.split())
+    assert re.search(r'it stands at (299|300)\.\d Hz', said)
+    assert re.search('1 false alarm in (4|3.9.?) s without chatter', said)
+    assert main(['listen', str(path), '--spindle-speed-rpm', '9000']) == 0
+    said = capsys.readouterr().out
+    assert 'it stands at' not in said
+    assert '0.0% of the time' in said
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('begin,end,state\n0,1,stable\n', 'row 1 is begin,end,state: .* the head start,end,state'),
+        ('start,end,state\n', 'has no rows'),
+        ('', 'has no rows'),
+        ('0,1,klappern\n1,2,ruhig\n', "only the states 'klappern', 'ruhig': one at least must"),
+    ],
+)
+def test_labels_that_would_score_nothing_are_refused(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / 'labels.csv'
+    path.write_text(text)
+    with pytest.raises(SignalFileError, match=said):
+        read_labels(path)
+    path.write_text('0,1,air cut\n1,2,chatter\n')
+    assert [label.state for label in read_labels(path)] == ['air cut', 'chatter']
 
 
 def test_labels_that_are_none_name_their_row(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -66,3 +67,14 @@ def test_a_record_that_begins_late_has_full_panels() -> None:
     for excerpt in excerpts_of(run):
         assert len(excerpt.samples['time']) >= 2499
         assert excerpt.spectrum('tool_displacement').frequency.size
+
+
+def test_a_settled_figure_is_no_first_guess() -> None:
+    told = np.array([[1.0, 1.02, 1.04, 1.06, 3.0], [1001.8, 207.0, 207.2, math.nan, 50.0]])
+    run = History(
+        Path('run'), Machine(), Cut(), RunSamples.of({'time': told[0]}),
+        estimates={'frequency': told},
+    )  # fmt: skip
+    assert run.settled('frequency', 1.0, 2.0) == 207.2
+    assert math.isnan(run.settled('frequency', 1.5, 2.0))
+    assert math.isnan(run.settled('growth_rate', 1.0, 2.0))

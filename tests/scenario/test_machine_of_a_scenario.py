@@ -42,6 +42,28 @@ def scenario(tmp_path: Path) -> Path:
     return file
 
 
+def test_a_machine_without_a_spindle_is_advised_no_speed_beyond_the_usual(tmp_path: Path) -> None:
+    """A body of several modes is not identified: 60 f/k is all there is, of some 1000 Hz."""
+    modes = '{frequency: 1000 Hz, damping_ratio: 3 %, mass: 2 kg}'
+    modes += ', {frequency: 2500 Hz, damping_ratio: 3 %, mass: 2 kg}'
+    (tmp_path / 'lathe.yaml').write_text(
+        f'tool: {{modes: [{modes}]}}\nmaterial: {{cutting_coefficient: 1500 MPa}}\n'
+        'workpiece: {modes: [{frequency: 3000 Hz, damping_ratio: 3 %, mass: 50 kg}]}\n'
+        'cut: {spindle_speed: 6000 rpm, depth_of_cut: 1 mm, feed: 0.1 mm/rev}\n'
+    )
+    file = tmp_path / 'scenario.yaml'
+    file.write_text(
+        'duration: 2\nparameters: {machine: lathe.yaml}\n'
+        'steps:\n  - at: 1.5\n    set: {depth_of_cut: 5 mm}\n'
+    )
+    told: list[str] = []
+    done = simulate(load_scenario(file), tmp_path / 'run', tell=lambda _t, what: told.append(what))
+    assert done.flagged
+    speeds = [float(what.split()[2]) for what in told if what.startswith('advice: try')]
+    assert speeds
+    assert all(60.0 <= speed <= 30_000.0 for speed in speeds), told
+
+
 def test_chatter_is_flagged_and_cured_within_the_range_of_the_spindle(
     scenario: Path, tmp_path: Path
 ) -> None:
