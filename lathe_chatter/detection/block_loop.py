@@ -130,7 +130,8 @@ def take_hops(
         done += 1
         between = 1 <= now.holding <= 2 or now.ramping != 0
         between = between or (now.alarmed != 0 and settings.believed != UNCHECKED)
-        take_hop(memory.fit, not between and now.hops_seen > _FIT_AFTER)
+        seen = now.amplitude > now.smallest_amplitude  # roundings fit no machine
+        take_hop(memory.fit, seen and not between and now.hops_seen > _FIT_AFTER)
         newest = (now.newest + 1) % HOPS
         now.newest = newest
         follow(samples, settings, kernels, memory, products[newest])

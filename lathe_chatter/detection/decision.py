@@ -339,6 +339,8 @@ def judge(
     shortest = _SHORT if grows else HOPS
     if now.alarmed == 0 and now.ramping == 0 and speed > 0.0 and now.hops_seen >= shortest:
         steady = _saturated(state, products, newest, strongest, stiff, grows)
+        # Roundings are steady too.
+        steady = steady and amplitude > now.smallest_amplitude
         now.saturated = now.saturated + 1 if steady else 0
     _decide(state, amplitude, recent)
     write_figures(state, windows, wave, model, amplitude)

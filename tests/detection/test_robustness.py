@@ -381,6 +381,24 @@ def test_another_depth_of_a_cut_without_noise_is_no_chatter_and_its_roundings_no
         assert not any(estimate.faults for estimate in seen)
 
 
+@pytest.mark.parametrize('told', [True, False])
+@pytest.mark.parametrize(
+    ('before', 'after'), [(3641.0, 3700.0), (3641.0, 3300.0), (3300.0, 3641.0)]
+)
+def test_another_speed_of_a_cut_without_noise_is_no_chatter(
+    before: float, after: float, told: bool
+) -> None:
+    cut = Cut(spindle_speed_rpm=before, depth_of_cut=0.65e-3)
+    for seated in (False, True):
+        assert rightmost_root(Machine(), after, cut.depth_of_cut, seated=seated).real < 0.0
+    detector, lathe = ChatterDetector(Machine() if told else None), VirtualLathe(cut=cut)
+    seen = _watch(detector, lathe.advance(100_000))
+    lathe.retune(cut.with_changes(spindle_speed_rpm=after))
+    seen += _watch(detector, lathe.advance(40_000))
+    assert not any(estimate.chatter for estimate in seen)
+    assert not any('not fit' in estimate.machine_fit for estimate in seen)
+
+
 def test_a_cutting_coefficient_that_cannot_be_there_costs_no_advice() -> None:
     """A depth of 0.35 m would follow: only C w is needed for a speed, and that is heard."""
     detector = ChatterDetector(Machine(cutting_coefficient=1e4))
