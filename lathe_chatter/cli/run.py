@@ -49,7 +49,8 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         '--page', action='store_true',
         help="open the operator's page in the browser and play nothing: whoever has it open "
-        'operates, and may play scenarios, until Ctrl-C',
+        'operates, and may play scenarios, until Ctrl-C; the force has a little noise, 0.001 '
+        'N/sqrt(Hz), unless the scenario says otherwise',
     )  # fmt: skip
     parser.add_argument(
         '--supervise',
@@ -57,6 +58,10 @@ def configure(parser: ArgumentParser) -> None:
         help='have a supervisor too, that watches, waits for ~/accept, or acts',
     )
     add_json(parser)
+
+
+_PAGE_NOISE = 0.001
+"""Of the force, N/sqrt(Hz): that of a calm workshop."""
 
 
 def run(options: Namespace) -> int:
@@ -67,6 +72,11 @@ def run(options: Namespace) -> int:
         load_machine(options.machine)
         parameters = {**scenario.parameters, MACHINE_FILE.name: options.machine}
         scenario = replace(scenario, parameters=parameters)
+    if options.page and 'force_noise' not in scenario.parameters:
+        # Without any, a stable cut is at rest, and the page has neither growth nor margin to show.
+        scenario = replace(
+            scenario, parameters={**scenario.parameters, 'force_noise': _PAGE_NOISE}
+        )
     if options.supervise is not None:
         supervisor = {**(scenario.supervisor or {}), 'mode': options.supervise}
         scenario = replace(scenario, supervisor=supervisor)

@@ -85,11 +85,9 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
     # -- listening -------------------------------------------------------------------------
 
     def _on_samples(self, data: bytes) -> None:
-        if not self.playing:
-            return
         samples, columns = self._decoder.decode(data)
         self.time = float(samples[-1, columns.index('time')])
-        if not self._in_flight:
+        if self.playing and not self._in_flight:
             step = self.player.due(self.time, self._estimates['recommended_speed_rpm'])
             if step is not None:
                 self._play(step)
