@@ -6,8 +6,9 @@ import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, add_run, utf8
+from lathe_chatter.cli.common_options import PICTURES, add_json, add_run, utf8
 from lathe_chatter.cli.console import Screen, writing
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.export import (
     discontinuity_sentences,
@@ -23,6 +24,14 @@ EXAMPLE = 'lathe-chatter export runs/20260401-120000 --columns tool_displacement
 
 _FILES = {'csv': to_csv, 'parquet': to_parquet, 'mat': to_mat, 'hdf5': to_hdf5}
 _SUFFIXES = {'hdf5': '.h5', 'unrolled': '-unrolled'}
+_OF_FORMAT = {
+    'csv': ('.csv',),
+    'parquet': ('.parquet',),
+    'mat': ('.mat',),
+    'hdf5': ('.h5', '.hdf5'),
+}
+_ENDINGS = {each for endings in _OF_FORMAT.values() for each in endings} | set(PICTURES)
+"""Endings that say what a file is."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -60,6 +69,11 @@ def run(options: Namespace) -> int:
     if options.columns is not None:
         columns = tuple(name.strip() for name in options.columns.split(','))
     chosen = Selection(options.topic, columns, options.start, options.end)
+    if path.suffix in _ENDINGS and path.suffix not in _OF_FORMAT.get(form, ()):
+        allowed = f'a name that ends in {suffix}, as --format {form} is written'
+        if options.unrolled:
+            allowed = 'the name of a folder'
+        raise ParameterError('--output', str(path), '', allowed)
     if form != 'csv':
         utf8('--output', path)
     recorded = read_run(source)

@@ -10,8 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.cli.common_options import add_force, add_json, in_unit
+from lathe_chatter.cli.common_options import PICTURES, add_force, add_json, in_unit
 from lathe_chatter.cli.console import Screen, keep_existing, writing
+from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine, Mode
 from lathe_chatter.model.cut import BearingContact
 from lathe_chatter.model.machine import Structure
@@ -40,8 +41,8 @@ def configure(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         '--machine', metavar='FILE',
-        help='machine file that gives what is not identified (default: none; then the bearing '
-        'has no clearance and the material is the one of the paper)',
+        help='machine file that gives what is not identified (default: none; what is not '
+        'measured is then left out of the file)',
     )  # fmt: skip
     parser.add_argument(
         '--modes', nargs='*', default=[], metavar='BODY=N', type=_body_and_count,
@@ -77,6 +78,9 @@ def run(options: Namespace) -> int:
     """Fit, write and print."""
     screen = Screen(json=options.json)
     output: Path = options.output
+    if output.suffix in PICTURES:
+        allowed = 'no name of a picture, which is drawn beside it, but one as machine.yaml'
+        raise ParameterError('--output', str(output), '', allowed)
     picture = output.with_suffix('.png')
     keep_existing(output, *files_of_picture(picture), force=options.force)
     base = _base(options.machine)
@@ -94,20 +98,49 @@ def run(options: Namespace) -> int:
                     highest_frequency=high,
                 )
     described = _described(base, fits)
+    unknown = _unknown(fits, base, given=options.machine is not None)
+    said = ''
+    if unknown:
+        names = ', '.join(_UNKNOWN[name] for name in unknown)
+        said = (
+            f'Not measured, and so not in the file: {names}. '
+            'Without them the values of the paper are taken.'
+        )
     with writing(output):
-        described.save(output)
+        described.save(output, lacking=unknown, comment=said)
     from lathe_chatter.report.modal_fit import draw_fits
 
     with writing(picture):
         draw_fits(fits, picture)
     _show(screen, fits)
+    if said:
+        screen.say(f'WARNING  {said}')
     screen.name_file('machine', output)
     screen.name_file('picture', picture)
     screen.json({'machine': output, 'picture': picture, 'modes': {
         body: [{**_figures(mode), 'errors': dict(zip(_FIGURES, mode.errors, strict=True))}
                for mode in fit.modes] for body, fit in fits.items()},
-        'warnings': [said for fit in fits.values() for said in fit.warnings]})  # fmt: skip
+        'warnings': [said for fit in fits.values() for said in fit.warnings],
+        'not_measured': unknown})  # fmt: skip
     return 0
+
+
+_UNKNOWN = {
+    'tool': 'the tool (`tool: rigid`, if it does not give)',
+    'workpiece': 'the workpiece (`workpiece: rigid`, if it does not give)',
+    'bearing': 'the bearing and its clearance',
+    'material': 'the cutting coefficient (steel has about 2000 MPa)',
+    'spindle': "the spindle's speeds",
+    'cut': 'the cut',
+}
+
+
+def _unknown(fits: dict[str, ModalFit], base: MachineDescription, *, given: bool) -> list[str]:
+    """Sections that neither tap tests nor a machine file say anything of."""
+    if not given:
+        return [name for name in _UNKNOWN if name not in fits]
+    lacking = [name for name in base.assumed if name not in fits]
+    return ['material' if name == 'cutting_coefficient' else name for name in lacking]
 
 
 _FIGURES = ('frequency', 'damping_ratio', 'stiffness')

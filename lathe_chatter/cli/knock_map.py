@@ -10,7 +10,12 @@ import numpy as np
 
 from lathe_chatter.cli.common_options import add_force, add_json, in_unit
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
-from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
+from lathe_chatter.cli.parameter_options import (
+    ONLY_OF_SAMPLES,
+    add_parameter_options,
+    config_of,
+    say_what_is_assumed,
+)
 from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks import KnockGrid, KnockLimit, KnockMap, Margin, run_knock_map
@@ -59,9 +64,8 @@ def configure(parser: ArgumentParser) -> None:
     add_parameter_options(
         parser,
         without=(
-            'spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'force_noise',
-            'sensor_noise', 'runout', 'speed_variation_amplitude', 'speed_variation_frequency',
-            'seed', 'sample_rate', 'spindle_acceleration', 'tool_leaves_cut',
+            *ONLY_OF_SAMPLES, 'spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance',
+            'speed_variation_amplitude', 'speed_variation_frequency', 'tool_leaves_cut',
         ),
     )  # fmt: skip
 
@@ -107,6 +111,7 @@ def run(options: Namespace) -> int:
     with writing(options.output):
         draw_knock_map(knocks, options.output)
     _show(knocks, screen)
+    say_what_is_assumed(config, screen)
     screen.name_file('points', options.output)
     for file in files:
         screen.name_file('picture', file)

@@ -19,7 +19,12 @@ from lathe_chatter.cli.common_options import (
     picture_file,
 )
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
-from lathe_chatter.cli.parameter_options import add_parameter_options, config_of
+from lathe_chatter.cli.parameter_options import (
+    ONLY_OF_SAMPLES,
+    add_parameter_options,
+    config_of,
+    say_what_is_assumed,
+)
 from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.errors import ParameterError, UnprovenError
 from lathe_chatter.lathe.config import LatheConfig
@@ -91,10 +96,7 @@ def configure(parser: ArgumentParser) -> None:
     add_executor(parser)
     add_force(parser)
     add_json(parser)
-    add_parameter_options(
-        parser, without=('force_noise', 'sensor_noise', 'runout', 'seed', 'sample_rate',
-                         'spindle_acceleration'),
-    )  # fmt: skip
+    add_parameter_options(parser, without=ONLY_OF_SAMPLES)
 
 
 def run(options: Namespace) -> int:
@@ -134,6 +136,7 @@ def run(options: Namespace) -> int:
     if growth is not None or probability is not None:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
+    say_what_is_assumed(config, screen)
     figures = _figures(config, limits, growth)
     if probability is not None and known:
         of_cut = stability_probability(

@@ -6,8 +6,15 @@ from argparse import ArgumentParser, BooleanOptionalAction, Namespace
 from collections.abc import Iterable
 from typing import Any
 
+from lathe_chatter.cli.console import Screen
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model.lathe_parameter_table import LATHE
+
+ONLY_OF_SAMPLES = (
+    'unbalance', 'force_noise', 'cutting_force_noise', 'sensor_noise', 'acceleration_noise',
+    'runout', 'tool_runout', 'accelerometers', 'seed', 'sample_rate', 'spindle_acceleration',
+)  # fmt: skip
+"""Parameters that change samples, and no limit of a cut."""
 
 
 def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()) -> None:
@@ -50,6 +57,12 @@ def given_parameters(options: Namespace) -> dict[str, Any]:
     """
     values = {row: getattr(options, row.name, None) for row in LATHE}
     return {row.name: row.check(value) for row, value in values.items() if value is not None}
+
+
+def say_what_is_assumed(config: LatheConfig, screen: Screen) -> None:
+    """Warn of a machine file that lacks what the paper's machine stands in for."""
+    if config.described and (said := config.described.assumption(config.machine)):
+        screen.say(f'WARNING  {said}')
 
 
 def config_of(options: Namespace) -> LatheConfig:

@@ -70,8 +70,10 @@ def run(options: Namespace) -> int:
     begun = time.perf_counter()
     done = _simulated(options, scenario, knocks, screen)
     spent = time.perf_counter() - begun
+    ratio = done.time / spent
+    shown = f'{ratio:.0f}' if ratio >= 9.95 else f'{ratio:.2g}'
     screen.say(
-        f'{done.time:g} s simulated in {spent:.2f} s, {done.time / spent:.0f} times real time: '
+        f'{done.time:g} s simulated in {spent:.2f} s, {shown} times real time: '
         f'{done.samples} samples.'
     )
     if done.guard:

@@ -8,7 +8,7 @@ clearance.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
@@ -54,6 +54,14 @@ _IN_FILE = {
     },
 }
 """Where each value of the file but those of the modes stands in a `MachineDescription`."""
+RIGID = Mode(5e4, _TURN * 1e3, 0.5)
+"""What a file calls `rigid`: 2e12 N/m, well damped, so that no figure shows that it gives."""
+_ASSUMED = {
+    'tool': 'a tool (50 g at 123 Hz; `tool: rigid` is one that does not give)',
+    'workpiece': 'a workpiece (50 g at 103 Hz; `workpiece: rigid` is one that does not give)',
+    'cutting_coefficient': 'a cutting coefficient (3.5 MPa; steel has about 2000 MPa)',
+}
+"""What is taken where a file has one body, and lacks another or the material."""
 _BESIDE = {'material': ['errors']}
 
 
@@ -69,6 +77,8 @@ class MachineDescription:
         spindle_acceleration: rev/min per s, 0 where a change of speed is a step.
         uncertainty: How well the figures are known, None where the file says nothing of it.
         name: Of the file, for titles.
+        assumed: Which of tool, workpiece and cutting_coefficient a file lacks that tells of one
+            body: they are the paper's.
 
     Raises:
         ParameterError: If the slowest speed is not below the fastest.
@@ -81,6 +91,7 @@ class MachineDescription:
     spindle_acceleration: float = 0.0
     uncertainty: Uncertainty | None = None
     name: str = ''
+    assumed: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -105,17 +116,50 @@ class MachineDescription:
             f'{self.slowest_speed:g} to {self.fastest_speed:g} rev/min.'
         )
 
+    def assumption(self, machine: Machine | None = None) -> str:
+        """That the paper's machine stands in for what the file lacks, a sentence; else empty.
+
+        Args:
+            machine: That is taken: what it has otherwise than the file was given beside it.
+        """
+        taken = machine or self.machine
+        lacking = [
+            _ASSUMED[name]
+            for name in self.assumed
+            if getattr(taken, name) == getattr(self.machine, name)
+        ]
+        if not lacking:
+            return ''
+        if 'workpiece' in self.assumed and self.cut.bearing_contact is not BearingContact.NONE:
+            clearance = self.cut.bearing_clearance * 1e6
+            gap = f', with a bearing clearance of {clearance:g} um'
+        else:
+            gap = ''
+        return (
+            f'The machine file {self.name} lacks {" and ".join(lacking)}: what the paper has is '
+            f'taken{gap}.'
+        )
+
     def text(self) -> str:
         """The same as one line of JSON, which `load_machine` takes: to the last bit."""
         return json.dumps(self.sections())
 
-    def save(self, path: Path | str) -> None:
+    def save(self, path: Path | str, *, lacking: Iterable[str] = (), comment: str = '') -> None:
         """Write a machine file.
+
+        Args:
+            path: Of the file.
+            lacking: Sections that are left out, for nothing is known of them.
+            comment: A sentence at its top.
 
         Raises:
             MachineFileError: If it cannot be written.
         """
-        text = yaml.safe_dump(self.sections(), sort_keys=False, default_flow_style=None)
+        left_out = set(lacking)
+        kept = {name: part for name, part in self.sections().items() if name not in left_out}
+        text = yaml.safe_dump(kept, sort_keys=False, default_flow_style=None)
+        if comment:
+            text = f'# {comment}\n{text}'
         try:
             Path(path).write_text(text, encoding='utf-8')
         except OSError as error:
@@ -126,6 +170,9 @@ class MachineDescription:
         known, made = self.uncertainty or Uncertainty(), dict[str, Any]()
         for name in ('tool', 'workpiece'):
             body: Body = getattr(self.machine, name)
+            if body == RIGID:
+                made[name] = 'rigid'
+                continue
             made[name] = {'modes': [_described(mode) for mode in body.modes]}
             if (covariance := known.covariance_of(name, len(body.modes))) is not None:
                 made[name]['covariance'] = covariance.tolist()
@@ -202,7 +249,9 @@ def _description(top: Section, name: str) -> MachineDescription:
     top.only('tool', 'workpiece', *_IN_FILE)
     known, given = Uncertainty(), dict[str, Any]()
     for part in ('tool', 'workpiece'):
-        if part in top.nodes:
+        if part in top.nodes and _is_rigid(top, part):
+            given[f'machine.{part}'] = RIGID
+        elif part in top.nodes:
             given[f'machine.{part}'], known = _body(top.inner(part), part, known)
     if 'workpiece' in top.nodes and 'bearing' not in top.nodes:
         given['cut.bearing_contact'] = BearingContact.NONE
@@ -221,10 +270,29 @@ def _description(top: Section, name: str) -> MachineDescription:
         owned[owner][key] = value
     try:
         machine, cut = Machine(**owned['machine']), Cut(**owned['cut'])
-        return MachineDescription(machine, cut, **owned[''], uncertainty=known or None, name=name)
+        return MachineDescription(
+            machine, cut, **owned[''], uncertainty=known or None, name=name, assumed=_lacking(top)
+        )
     except ParameterError as error:
         section = top.inner('spindle') if error.name in owned[''] else top
         raise section.refused(str(error).rstrip('.')) from None
+
+
+def _is_rigid(top: Section, part: str) -> bool:
+    """Whether a body is told to be rigid, and not by its modes."""
+    node = top.nodes[part]
+    if isinstance(node, yaml.ScalarNode) and node.value and node.value != 'rigid':
+        raise top.refused(f'{part} must have `modes`, or be rigid', node)
+    return isinstance(node, yaml.ScalarNode) and node.value == 'rigid'
+
+
+def _lacking(top: Section) -> tuple[str, ...]:
+    """What a file that tells of a body does not tell of."""
+    bodies = [part for part in ('tool', 'workpiece') if part not in top.nodes]
+    if len(bodies) == 2:
+        return ()
+    known = 'cutting_coefficient' in top.inner('material').nodes
+    return (*bodies, *(() if known else ('cutting_coefficient',)))
 
 
 def _errors(

@@ -58,6 +58,8 @@ class LatheRecord:
         config = recorded_config(values)
         self._setup, self._doubts = config.setup, list[str]()
         self._described, self._speed_doubt = config.described, ''
+        if config.described and (lacking := config.described.assumption(config.machine)):
+            self._logger.warning(lacking)
         self._doubt(config.cut)
 
     def write(self, samples: Array) -> None:

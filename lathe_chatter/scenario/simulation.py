@@ -179,7 +179,8 @@ class _Simulation:
     def log_doubts(self) -> None:
         """Why the samples may not be what was meant; each sentence once."""
         speed = self.described.speed_doubt(self._lathe.cut) if self.described else ''
-        for sentence in (*self._lathe.doubts, speed):
+        lacking = self.described.assumption(self._lathe.machine) if self.described else ''
+        for sentence in (*self._lathe.doubts, speed, lacking):
             if sentence and sentence not in self._doubts:
                 self._doubts.append(sentence)
                 self._log(self._lathe.time, sentence)

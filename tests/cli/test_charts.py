@@ -116,8 +116,11 @@ def test_a_machine_without_a_limit_has_a_chart_too(
         (['knock-map', '--speeds', '3000:2000:5'], 'A:B:N with A below B'),
         (['knock-map', '--speeds', 'fast'], '--speeds is'),
         (['knock-map', '--speeds', '20 Hz:30 mm:2'], "--speeds is '30 mm'"),
-        (['lobes', '--to', '3 kg'], "--to is '3 kg' rev/min"),
-        (['identify', 'tool=x.uff', '--from', '3 m', '--output', '{tmp}/m.yaml'], "'3 m' Hz"),
+        (['lobes', '--to', '3 kg'], "--to is '3 kg': it must be"),
+        (
+            ['identify', 'tool=x.uff', '--from', '3 m', '--output', '{tmp}/m.yaml'],
+            "--from is '3 m': it must be",
+        ),
         (['run', '--machine', 'nowhere.yaml'], 'The machine nowhere.yaml cannot be read'),
         (['knock-map', '--depths', '1'], '--depths is 1.0 m'),
         (['knock-map', '--depths', '0.0001:0.001:x'], 'A:B:N'),
@@ -279,3 +282,27 @@ def test_a_map_that_fails_is_a_sentence_and_leaves_nothing_in_the_way(
     assert 'change the frequency of one by' in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
     assert cli.main([*call, '--tool.mass', '0.06']) == 0
+
+
+def test_a_chart_says_where_the_machine_of_the_paper_stands_in(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / 'tool.yaml'
+    file.write_text('tool: {modes: [{frequency: 200 Hz, damping_ratio: 2 %, mass: 5 kg}]}\n')
+    call = ['lobes', '--machine', str(file), '--force', '--output', str(tmp_path / 'a.png')]
+    assert cli.main(call) == 0
+    assert 'WARNING  The machine file tool lacks a workpiece (50 g' in capsys.readouterr().out
+    assert cli.main([*call, '--cutting-coefficient', '2e9', '--workpiece.mass', '60']) == 0
+    assert 'WARNING' not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('verb', ['lobes', 'knock-map'])
+@pytest.mark.parametrize('option', ['unbalance', 'cutting-force-noise', 'acceleration-noise',
+                                    'tool-runout', 'accelerometers', 'force-noise'])  # fmt: skip
+def test_an_option_that_would_change_nothing_is_refused(
+    verb: str, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([verb, f'--{option}', *([] if option == 'accelerometers' else ['1'])])
+    assert ended.value.code == 2
+    assert f'--{option}' in capsys.readouterr().err

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from support.tap_tests import tap_test
 
 from lathe_chatter.cli import main as cli
@@ -49,6 +50,37 @@ def test_a_tap_test_becomes_a_machine_file_and_a_picture(
     assert output.with_suffix('.png').stat().st_size > 10_000
     assert cli.main(['identify', *given, '--output', str(output)]) == 2
     assert '--force' in capsys.readouterr().err
+
+
+def test_what_was_not_measured_is_said_and_left_out(
+    tap_tests: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / 'machine.yaml'
+    call = ['identify', f'tool={tap_tests["tool"]}', '--output', str(output)]
+    assert cli.main(call) == 0
+    said = capsys.readouterr().out
+    for name in (
+        'the workpiece (`workpiece: rigid`',
+        'cutting coefficient',
+        'speeds',
+        'clearance',
+    ):
+        assert name in said.partition('WARNING  Not measured')[2]
+        assert name in output.read_text().splitlines()[0]
+    assert set(yaml.safe_load(output.read_text())) == {'tool'}
+    assert load_machine(output).assumed == ('workpiece', 'cutting_coefficient')
+    assert cli.main([*call, '--machine', 'chucked_shaft', '--force']) == 0
+    assert 'Not measured' not in capsys.readouterr().out
+    assert load_machine(output).machine.cutting_coefficient > 1e8
+
+
+def test_a_machine_file_is_not_overwritten_with_its_picture(
+    tap_tests: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ['identify', f'tool={tap_tests["tool"]}', '--output', str(tmp_path / 'x.png')]
+    assert cli.main(call) == 2
+    assert 'no name of a picture' in capsys.readouterr().err
+    assert not (tmp_path / 'x.png').exists()
 
 
 @pytest.mark.parametrize('wrong', ['spindle=a.csv', 'tool.csv', 'tool='])

@@ -26,7 +26,7 @@ CLI = Path(__file__).resolve().parents[2] / 'lathe_chatter' / 'cli'
 
 SENTENCES: dict[str, tuple[str, ...]] = {
     # simulate
-    r'\S+ s simulated in \S+ s, \d+ times real time: \d+ samples\.': (
+    r'\S+ s simulated in \S+ s, (\d\d+|\d(\.\d+)?) times real time: \d+ samples\.': (
         *(
             'quiet',
             'chatter',
@@ -103,7 +103,7 @@ TOLD_ELSEWHERE = {
     'The simulated time went back to zero ': 'recording/test_recorded_cuts.py',
     'stable with ': 'test_charts.py',
     'uncertain there by: ': 'test_charts.py',
-    'WARNING  ': 'tap_test',
+    'WARNING  ': 'tap_test, test_charts.py, test_identify.py',
     '  (scenario ': 'test_run.py',
 }
 """Those that need ROS, an interrupt, or what is another's: where they are walked."""

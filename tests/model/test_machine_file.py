@@ -9,10 +9,11 @@ import pytest
 
 from lathe_chatter.errors import MachineFileError, ParameterError
 from lathe_chatter.lathe.config import config_from
-from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.model.lathe_parameter_table import LATHE, machine_from
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.model.uncertainty import uncertainty_from
+from lathe_chatter.stability import critical_depths
 
 SHAFT = """
 tool:
@@ -255,3 +256,35 @@ def test_uncertainty_in_short() -> None:
     for wrong in ('speed=2%', 'frequency=two', 'frequency=-1%'):
         with pytest.raises(ParameterError, match='--uncertain'):
             uncertainty_from(wrong, Machine())
+
+
+TOOL_ALONE = 'tool: {modes: [{frequency: 200 Hz, damping_ratio: 2 %, stiffness: 1e7 N/m}]}\n'
+STEEL = 'material: {cutting_coefficient: 1500 MPa}\n'
+
+
+def test_a_rigid_body_leaves_the_limit_of_the_other_alone(tmp_path: Path) -> None:
+    """The lowest limit of one mode is 2 k zeta (1 + zeta) / C."""
+    found = load_machine(TOOL_ALONE + 'workpiece: rigid\n' + STEEL)
+    assert found.cut.bearing_contact is BearingContact.NONE
+    assert not found.assumption()
+    speeds = np.linspace(1000.0, 20000.0, 4001)
+    lowest = critical_depths(found.machine, speeds, seated=False).min()
+    assert lowest == pytest.approx(2.0 * 1e7 * 0.02 * 1.02 / 1.5e9, rel=1e-4)
+    found.save(tmp_path / 'a.yaml')
+    assert 'workpiece: rigid' in (tmp_path / 'a.yaml').read_text()
+    assert load_machine(tmp_path / 'a.yaml') == replace(found, name='a')
+    with pytest.raises(MachineFileError, match='line 2: workpiece must have `modes`, or be rigid'):
+        load_machine(TOOL_ALONE + 'workpiece: stiff')
+
+
+def test_what_stands_in_for_what_a_file_lacks_is_said() -> None:
+    said = load_machine(TOOL_ALONE).assumption()
+    assert 'lacks a workpiece (50 g' in said
+    assert 'and a cutting coefficient (3.5 MPa' in said
+    assert said.endswith('with a bearing clearance of 5 um.')
+    assert 'cutting coefficient' not in load_machine(TOOL_ALONE + STEEL).assumption()
+    beside = replace(Machine(), cutting_coefficient=2e9, workpiece=Mode(60.0, 650.0, 0.05))
+    assert not load_machine(TOOL_ALONE).assumption(beside)
+    assert not load_machine('spindle: {fastest_speed: 3000 rpm}\n').assumption()
+    for machine in shipped_machines():
+        assert not load_machine(machine).assumption()
