@@ -275,8 +275,8 @@ class RecordedRun:
         ]
         self._board.put('events', [list(event) for event in sorted(found)])
         self._board.put('flags', history.chatter_spans())
-        points = [stay.cut for stay in stays_of(history)]
-        self._board.put('path', [[cut.spindle_speed_rpm, cut.depth_of_cut] for cut in points])
+        points = [(stay.start, stay.cut) for stay in stays_of(history)]
+        self._board.put('path', [[t, c.spindle_speed_rpm, c.depth_of_cut] for t, c in points])
 
 
 def _picked(part: Any) -> Array:

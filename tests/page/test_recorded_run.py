@@ -155,7 +155,9 @@ def test_a_browser_scrubs_through_the_run(served: str, tmp_path: Path, width: in
         browser.key('Home', 36)
         browser.until('parseFloat(document.querySelector("#clock").textContent) < 0.1', 'zero')
         browser.until('document.querySelector("#lamp-word").textContent !== "CHATTER"', 'no lamp')
+        assert browser.run('trail.length') == 1  # the way as far as the moment that is shown
         browser.run('look(4.1, 0.1)')
+        assert browser.run('trail.length') == 2
         browser.until('document.querySelector("#lamp-word").textContent === "CHATTER"', 'the lamp')
         browser.until('document.querySelector("#chart-text").textContent.includes("0.62")', 'it')
         for plot in ('displacement-0', 'velocity-0', 'tool-portrait', 'spectrum', 'chart'):

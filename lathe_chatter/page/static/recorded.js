@@ -2,7 +2,7 @@
 'use strict';
 
 const SPANS = [0.01, 0.1, 1, 2, 10, 60, 600, 3600];
-const run = {at: 0, span: 2, busy: false, again: false};
+const run = {at: 0, span: 2, busy: false, again: false, path: []};
 
 function takeRun(news) {
   if (news.run) {
@@ -23,7 +23,7 @@ function takeRun(news) {
   }
   if ('reading' in news) run.reading = news.reading;
   $('run-state').textContent = [run.state, run.reading == null ? '' : `Read so far: ${(run.reading * 100).toFixed(0)} %.`].join(' ');
-  if (news.path) trail = news.path.map(([speed, depth]) => ({speed, depth}));
+  if (news.path) run.path = news.path;
   if (news.events) {
     $('log').replaceChildren(...news.events.map(([time, text]) => {
       const item = document.createElement('li'), button = document.createElement('button');
@@ -44,6 +44,7 @@ function view(plot, from, to) {
 // One request at a time, and then the newest: a slider that is drawn does not wait for old pictures.
 async function look(at, span = run.span) {
   Object.assign(run, {at, span});
+  trail = run.path.filter(([time], k) => k === 0 || time <= at).map(([, speed, depth]) => ({speed, depth}));
   $('at').value = at;
   $('at-text').value = `${at.toFixed(span < 0.2 ? 4 : 2)} s`;
   run.again = true;
