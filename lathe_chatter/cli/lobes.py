@@ -13,6 +13,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.cli.common_options import (
+    PICTURES,
     add_force,
     add_json,
     in_unit,
@@ -58,6 +59,8 @@ _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
 _PROBABLE_SPEEDS, _PROBABLE_MACHINES = 200, 1000
+_PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""At which JSON has the depth that is stable with them."""
 _SHALLOWEST = 1000.0
 """Part of the top at which a map begins: at a depth of 0 there is no cut."""
 
@@ -92,7 +95,12 @@ def configure(parser: ArgumentParser) -> None:
         '--output', type=Path, default=Path('lobes.png'), metavar='FILE',
         help='picture to write: .png with an .svg beside it, .svg or .pdf (default: %(default)s)',
     )  # fmt: skip
-    parser.add_argument('--csv', type=Path, metavar='FILE', help='write the limits as CSV too')
+    parser.add_argument(
+        '--csv',
+        type=Path,
+        metavar='FILE',
+        help='write the limits as CSV too, and with --map its points beside them as FILE-map.csv',
+    )
     add_executor(parser)
     add_force(parser)
     add_json(parser)
@@ -106,9 +114,7 @@ def run(options: Namespace) -> int:
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
     files = files_of_picture(picture_file(options.output))
-    keep_existing(*files, *([options.csv] if options.csv else []), force=options.force)
-    if options.csv in files:
-        raise ParameterError('--csv', str(options.csv), '', 'another file than the picture')
+    keep_existing(*files, *_tables(options, config), force=options.force)
     limits = chart_limits(
         config.machine,
         config.cut,
@@ -132,7 +138,7 @@ def run(options: Namespace) -> int:
         draw_lobes(config.cut, limits, growth, top, options.output, probability=probability)
     if options.csv is not None:
         with writing(options.csv):
-            _write_csv(options.csv, config, limits)
+            _write_csv(options.csv, _columns(config, limits), growth, probability)
     if growth is not None or probability is not None:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
@@ -149,6 +155,16 @@ def run(options: Namespace) -> int:
         screen.name_file('picture', file)
     screen.json(figures)
     return 0
+
+
+def _tables(options: Namespace, config: LatheConfig) -> list[Path]:
+    """The files of figures that are wanted."""
+    if options.csv is None:
+        return []
+    if options.csv.suffix in PICTURES:
+        raise ParameterError('--csv', str(options.csv), '', 'another file than a picture')
+    mapped = options.map or config.cut.speed_variation_amplitude > 0.0
+    return [options.csv, *([_map_file(options.csv)] if mapped else [])]
 
 
 def _speed_range(options: Namespace, config: LatheConfig) -> tuple[float, float]:
@@ -240,9 +256,37 @@ def _columns(config: LatheConfig, limits: SafeLimit) -> dict[str, Array]:
     return columns
 
 
-def _write_csv(path: Path, config: LatheConfig, limits: SafeLimit) -> None:
-    """Limits over speed, m and rev/min; an infinite limit is `inf`."""
-    columns = _columns(config, limits)
+def _write_csv(
+    path: Path, columns: dict[str, Array], growth: GrowthMap | None,
+    probability: StabilityProbability | None,
+) -> None:  # fmt: skip
+    """Limits over speed, m and rev/min; an infinite limit is `inf`.
+
+    With a probability the depth that is safe with 95 %, between its speeds along a line; a map
+    is a file of its own beside it, a row for each of its points.
+    """
+    if probability is not None:
+        known = probability.spindle_speed_rpm, probability.safe_depth(SURE)
+        sure = np.interp(columns['spindle_speed_rpm'], *known)
+        columns = {**columns, 'safe_depth_with_95_percent': sure}
+    _write_table(path, columns)
+    if growth is not None:
+        speed, depth = np.meshgrid(growth.spindle_speed_rpm, growth.depth_of_cut)
+        points = {
+            'spindle_speed_rpm': speed,
+            'depth_of_cut': depth,
+            'growth_rate': growth.growth_rate,
+            'seated': growth.seated.astype(int),
+        }
+        _write_table(_map_file(path), {name: each.ravel() for name, each in points.items()})
+
+
+def _map_file(path: Path) -> Path:
+    """Where the map goes whose limits are in a CSV file."""
+    return path.with_name(f'{path.stem}-map{path.suffix}')
+
+
+def _write_table(path: Path, columns: dict[str, Array]) -> None:
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file)
         writer.writerow(columns)
@@ -266,6 +310,8 @@ def _probable_figures(
         'safe_with_95_percent': {
             'spindle_speed_rpm': chart.spindle_speed_rpm,
             'depth_of_cut': chart.safe_depth(SURE),
+            'probabilities': _PROBABILITIES,
+            'depths': [chart.safe_depth(share) for share in _PROBABILITIES],
         },
         'cut': cut_probability(config.cut, of_cut),
     }

@@ -100,6 +100,9 @@ def _carried_out(options: Any) -> int:
     except BrokenPipeError:  # whoever read has enough, as `head` has
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _BROKEN_PIPE
+    except KeyboardInterrupt:
+        sys.stderr.write(f'lathe-chatter {options.verb}: interrupted before it was done.\n')
+        return INTERRUPTED
     except LatheChatterError as error:
         sys.stderr.write(f'lathe-chatter {options.verb}: {error}\n')
         return USER_ERROR

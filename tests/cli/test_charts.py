@@ -107,7 +107,7 @@ def test_a_machine_without_a_limit_has_a_chart_too(
         (['lobes', '--tool.mass', '0'], 'tool.mass is 0 kg'),
         (['lobes', '--output', '/dev/null/all.png'], 'cannot be'),
         (['lobes', '--output', 'chart.xyz'], 'a file that ends in .png, .svg or .pdf'),
-        (['lobes', '--output', '{tmp}/a.png', '--csv', '{tmp}/a.svg'], 'another file than'),
+        (['lobes', '--output', '{tmp}/a.png', '--csv', '{tmp}/b.svg'], 'another file than a'),
         (
             ['lobes', '--output', '{tmp}/a.png', '--csv', '/dev/full'],
             '/dev/full cannot be written',
@@ -306,3 +306,38 @@ def test_an_option_that_would_change_nothing_is_refused(
         cli.main([verb, f'--{option}', *([] if option == 'accelerometers' else ['1'])])
     assert ended.value.code == 2
     assert f'--{option}' in capsys.readouterr().err
+
+
+def table(path: Path) -> dict[str, np.ndarray]:
+    with path.open(encoding='utf-8') as file:
+        names, *rows = csv.reader(file)
+    return dict(zip(names, np.array(rows, float).T, strict=True))
+
+
+def test_the_csv_has_what_the_picture_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(lobes, '_PROBABLE_MACHINES', 100)
+    words = ['--from', '2000', '--to', '4000', '--json', '--csv']
+    place = ['--output', str(tmp_path / 'a.png'), '--force']
+    call = ['lobes', *words, str(tmp_path / 'sure.csv'), *place, '--uncertain', 'C=10%']
+    assert cli.main(call) == 0
+    told = json.loads(capsys.readouterr().out)['safe_with_95_percent']
+    found = table(tmp_path / 'sure.csv')
+    sure = found['safe_depth_with_95_percent']
+    assert np.mean(sure < found['safe_depth']) > 0.9
+    expected = np.interp(told['spindle_speed_rpm'], found['spindle_speed_rpm'], sure)
+    assert np.median(np.abs(expected / told['depth_of_cut'] - 1.0)) < 1e-3
+    assert told['depths'][told['probabilities'].index(0.95)] == told['depth_of_cut']
+    assert told['depths'][0] >= told['depths'][2]
+    assert cli.main(['lobes', *words, str(tmp_path / 'm.csv'), *place, '--map']) == 0
+    told = json.loads(capsys.readouterr().out)['map']
+    points = table(tmp_path / 'm-map.csv')
+    assert points['growth_rate'].tolist() == np.ravel(told['growth_rate']).tolist()
+    k = len(told['spindle_speed_rpm']) * 30 + 70
+    root = rightmost_root(
+        Machine(), points['spindle_speed_rpm'][k], points['depth_of_cut'][k],
+        seated=bool(points['seated'][k]),
+    )  # fmt: skip
+    assert points['growth_rate'][k] == pytest.approx(root.real, abs=1e-6)
+    assert cli.main(['lobes', '--csv', str(tmp_path / 'm.csv'), *place[:2], '--map']) == 2

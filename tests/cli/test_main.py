@@ -276,3 +276,40 @@ def test_an_interrupt_amid_an_import_is_no_traceback() -> None:
     command = [sys.executable, '-c', IMPORTING]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (143, '')
+
+
+@pytest.mark.parametrize(
+    ('verb', 'place', 'words'),
+    [
+        ('export', 'read_run', ['run']),
+        ('listen', 'read_signals', ['a.csv']),
+        ('identify', 'read_frequency_responses', ['tool=a.csv', '--output', 'a.yaml']),
+        ('report', 'read_history', ['run']),
+    ],
+)
+def test_an_interrupted_verb_says_so(
+    verb: str, place: str, words: list[str], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    def interrupted(*_values: object, **_options: object) -> object:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(f'lathe_chatter.cli.{verb}.{place}', interrupted)
+    assert main([verb, *words]) == 130
+    assert f'lathe-chatter {verb}: interrupted before it was done.' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('words', 'allowed'),
+    [
+        (['--format', 'mat', '--output', 'x.csv'], 'a name that ends in .mat'),
+        (['--output', 'x.png'], 'a name that ends in .csv'),
+        (['--unrolled', '--output', 'x.csv'], 'the name of a folder'),
+    ],
+)
+def test_an_export_whose_name_contradicts_its_format_is_refused(
+    words: list[str], allowed: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['export', 'run', *words]) == 2
+    assert f'it must be {allowed}' in capsys.readouterr().err
