@@ -122,6 +122,21 @@ def _work(code: str, function: Callable[[Item], Any], batch: Sequence[Item] | by
     return pickle.dumps([function(item) for item in pickle.loads(batch)]), processor_name()  # noqa: S301 -- ours
 
 
+def _end_alone() -> None:
+    """End this worker when its parent is gone, as by a SIGKILL: nobody else would end it.
+
+    Not by Linux' signal at the death of a parent, which comes also when but the thread ends that
+    has started the worker.
+    """
+
+    def wait() -> None:
+        if parent := multiprocessing.parent_process():
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
 def cores() -> int:
     """Those that this process may use."""
     return len(os.sched_getaffinity(0))
@@ -164,7 +179,8 @@ class Processes(Executor):
 
     def _new(self) -> futures.ProcessPoolExecutor:
         # Not forked: threads of a library that has begun to compute do not survive that.
-        return futures.ProcessPoolExecutor(self._max_workers, multiprocessing.get_context('spawn'))
+        context = multiprocessing.get_context('spawn')
+        return futures.ProcessPoolExecutor(self._max_workers, context, initializer=_end_alone)
 
     def _begin(self, outer: Future[Any], call: Callable[[], Any], retries: int) -> None:
         with self._lock:

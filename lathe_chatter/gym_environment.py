@@ -8,10 +8,10 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
-from lathe_chatter.errors import optional
+from lathe_chatter.errors import ParameterError, optional
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.model.quantity_fields import Quantity
+from lathe_chatter.model.quantity_fields import Quantity, count_of
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
@@ -33,7 +33,7 @@ class LatheEnv(gymnasium.Env):  # type: ignore[misc, name-defined]  # of no type
     `errors` says how widely machines are drawn about the paper's, as `--uncertain` takes them.
 
     Raises:
-        ParameterError: If the rate is not allowed.
+        ParameterError: If rate or steps are not allowed, or an action is not in its box.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class LatheEnv(gymnasium.Env):  # type: ignore[misc, name-defined]  # of no type
         """See the class."""
         self._samples = round(1e4 / _RATE.check('rate', rate))
         self._known, self._cut = uncertainty_from(errors, Machine()), cut
-        self._steps, self._damage = steps, damage
+        self._steps, self._damage = count_of('steps', steps, least=1), damage
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         seen = (2 * self._samples + 3,)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, seen, np.float32)
@@ -64,7 +64,12 @@ class LatheEnv(gymnasium.Env):  # type: ignore[misc, name-defined]  # of no type
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Set speed, depth and feed, and cut on for a period."""
-        levels = np.rint(_LEVELS * (0.5 + 0.5 * np.clip(action, -1.0, 1.0))) / _LEVELS
+        wanted = np.asarray(action)
+        numbers = wanted.dtype.kind in 'iuf' and wanted.shape == (3,)
+        if not numbers or not (np.abs(wanted) <= 1.0).all():  # nan is none either
+            allowed = 'three numbers from -1 to 1: spindle speed, depth of cut, feed'
+            raise ParameterError('action', wanted.tolist(), '', allowed)
+        levels = np.rint(_LEVELS * (0.5 + 0.5 * wanted)) / _LEVELS
         if (levels != self._set).any():
             values = (_LOW + levels * (_HIGH - _LOW)).tolist()
             self.lathe.retune(self._cut.with_changes(**dict(zip(_NAMES, values, strict=True))))

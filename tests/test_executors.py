@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, ThreadPoolExecutor
@@ -80,6 +82,42 @@ def test_a_pool_of_the_users_own_that_breaks_is_a_sentence(tmp_path: Path) -> No
     work = partial(square_unless_killed, mark=tmp_path / 'killed')
     with ProcessPoolExecutor(2) as pool, pytest.raises(WorkerError, match='workers are gone'):
         spread(work, range(12), executor=pool)
+
+
+@pytest.mark.parametrize('busy', [False, True])
+def test_workers_leave_when_their_parent_is_killed(busy: bool) -> None:
+    """Idle, or in the middle of something long: by `kill -9` nothing else is told to them."""
+    code = (
+        'import os, time; from lathe_chatter.executors import Processes\n'
+        'if __name__ == "__main__":\n'
+        '    pool = Processes(2); calls = [pool.submit(time.sleep, 0.5) for _ in range(2)]\n'
+        '    print(*pool._pool._processes, flush=True); [call.result() for call in calls]\n'
+        f'    [pool.submit(time.sleep, 1e4) for _ in range({2 * busy})]\n'
+        '    print("ready", flush=True); time.sleep(1e4)\n'
+    )
+    with subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        workers = [int(word) for word in run.stdout.readline().split()]
+        assert run.stdout.readline() == 'ready\n'
+        assert len(workers) == 2
+        assert all(is_alive(worker) for worker in workers)
+        run.kill()
+    for _ in range(600):
+        if not any(is_alive(worker) for worker in workers):
+            return
+        time.sleep(0.1)
+    for worker in workers:
+        os.kill(worker, signal.SIGKILL)
+    pytest.fail('workers outlive their parent')
+
+
+def is_alive(process: int) -> bool:
+    """Whether it is there, and not but a name in the table."""
+    try:
+        state = Path(f'/proc/{process}/stat').read_text(encoding='ascii').rpartition(')')[2]
+    except OSError:
+        return False
+    return state.split()[0] != 'Z'
 
 
 def test_what_kills_every_worker_ends_in_a_sentence() -> None:

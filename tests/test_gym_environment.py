@@ -74,3 +74,21 @@ def test_the_monitors_advice_beats_a_setting_chosen_blindly() -> None:
 def test_a_rate_that_no_spindle_follows_is_refused() -> None:
     with pytest.raises(ParameterError, match='rate is 200'):
         LatheEnv(rate=200.0)
+
+
+def test_no_steps_are_refused() -> None:
+    with pytest.raises(ParameterError, match='steps is 0: it must be a whole number of 1 or more'):
+        LatheEnv(steps=0)
+
+
+@pytest.mark.parametrize(
+    'action',
+    [[0.0, 0.0], [0.0, 1.5, 0.0], [0.0, np.nan, 0.0], [[0.0, 0.0, 0.0]], 0.5, ['a', 'b', 'c']],
+)
+def test_an_action_that_is_none_is_one_sentence(action: Any) -> None:
+    env = LatheEnv(steps=2)
+    env.reset(seed=3)
+    before = env.lathe.time
+    with pytest.raises(ParameterError, match=r'^action is .*three numbers from -1 to 1'):
+        env.step(action)
+    assert env.lathe.time == before

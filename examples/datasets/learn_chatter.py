@@ -14,9 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sklearn.ensemble import RandomForestClassifier
 
 from lathe_chatter.dataset import read_windows
+
+try:
+    from sklearn.ensemble import RandomForestClassifier
+except ImportError:
+    sys.exit('The forest needs scikit-learn, which is not installed: pip install scikit-learn')
 
 RATE = 1e4
 
@@ -56,4 +60,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == '__main__':
+    if len(sys.argv) != 2:
+        sys.exit('Give the folder of a data set: python learn_chatter.py data/chatter')
     main(Path(sys.argv[1]))

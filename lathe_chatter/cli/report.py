@@ -63,8 +63,8 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
     screen.table(titles, rows)
     screen.say(
         'Pairs: frequency / Hz and growth rate / (1/s) of the chatter as the monitor measured '
-        'them, medians over the time of the flag, and of the rightmost characteristic root, of '
-        'the machine open and on its bearing.'
+        'them, medians from the flag until it fell or the cut was changed, and of the rightmost '
+        'characteristic root, of the machine open and on its bearing.'
     )
     if not any(series.size for series in history.estimates.values()):
         screen.say('No figure of a monitor is in the record.')
@@ -161,7 +161,9 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
     for flag in history.flags:
         entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
         if flag.chatter:
-            until = next((end for start, end in spans if start == flag.time), flag.time)
+            ends = [end for start, end in spans if start == flag.time]
+            ends += [change.time for change in history.changes if change.time > flag.time]
+            until = min(ends, default=flag.time)  # what comes after is another cut
             for name in ('frequency', 'growth_rate'):
                 settled = history.settled(name, flag.time, until)
                 entry[name] = settled if math.isfinite(settled) else getattr(flag, name)

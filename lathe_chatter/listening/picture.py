@@ -9,7 +9,17 @@ import numpy as np
 
 from lathe_chatter.listening.detector_score import CHATTER, Judged, Label
 from lathe_chatter.listening.signal_file import Signals
-from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, grid, new_figure, save
+from lathe_chatter.plot_style import (
+    NEUTRAL,
+    TOOL,
+    WORKPIECE,
+    Scale,
+    grid,
+    new_figure,
+    save,
+    scale_for,
+)
+from lathe_chatter.samples.columns import UNITS
 
 _PIECES = 2000
 
@@ -30,9 +40,12 @@ def draw_judged(
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     time, values = signals.samples[:, 0], signals.samples[:, signals.columns.index(listened)]
     edges = np.unique(np.linspace(0, len(values), _PIECES + 1).astype(int))[:-1]
+    unit, name = UNITS.get(listened, ''), listened.replace('_', ' ')
+    scale = scale_for(unit, values) if unit else Scale(1.0, '')
+    values = values * scale.factor
     low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
     above.fill_between(time[edges], low, high, color=TOOL, linewidth=0.4)
-    above.set_ylabel(listened.replace('_', ' '))
+    above.set_ylabel(scale.label(name) if unit else name)
     flag = judged.flagged
     above.fill_between(
         judged.times, 0, 1, flag, transform=above.get_xaxis_transform(), color=WORKPIECE,

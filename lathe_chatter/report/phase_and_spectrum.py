@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import Machine
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, grid, scale_for, widen
-from lathe_chatter.report.run_excerpts import Excerpt
+from lathe_chatter.report.run_excerpts import Excerpt, Spectrum
 from lathe_chatter.report.run_history import History
 from lathe_chatter.stability import contact_at, root_of
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 _BODIES = (('tool', TOOL, 'o'), ('workpiece', WORKPIECE, 's'))
 _MODES_UP = 5.0
-"""How far a spectrum goes, in highest natural frequencies of the machine."""
+"""How far a spectrum goes at most, in highest natural frequencies of the machine."""
+_HEARD, _LINES_UP = 0.05, 3.0
+"""How far it goes, in frequencies of the highest line of that part of the largest amplitude."""
 _HEADROOM = 0.12
 """Of a portrait, above its curves."""
 _DECADES = 4.0
@@ -67,10 +69,10 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     """Amplitude spectra of both displacements, with the frequency that the root predicts."""
     session = history.session_at(excerpt.until)
     spectra = {name: excerpt.spectrum(f'{name}_displacement') for name, _, _ in _BODIES}
-    highest = min(
-        _highest_frequency(session.machine),
-        *(s.frequency.max(initial=0.0) for s in spectra.values()),
-    ) or _highest_frequency(session.machine)
+    contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
+    root = root_of(session.machine, excerpt.cut, seated=contact.seated)
+    expected = root.imag / (2.0 * math.pi)
+    highest = _highest_frequency(session.machine, expected, list(spectra.values()))
     top = max(
         float(s.amplitude[s.frequency <= highest].max(initial=0.0)) for s in spectra.values()
     )
@@ -87,9 +89,6 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     if top < _FAINTEST:
         _say_at_rest(axes, 'no amplitude above 1 nm')
         top = _TOP_AT_REST
-    contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
-    root = root_of(session.machine, excerpt.cut, seated=contact.seated)
-    expected = root.imag / (2.0 * math.pi)
     axes.axvline(expected, color='k', lw=0.9, ls='--', label=f'root, {expected:.1f} Hz')
     axes.axvline(excerpt.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')
     axes.set_yscale('log')
@@ -101,10 +100,16 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
     grid(axes)
 
 
-def _highest_frequency(machine: Machine) -> float:
-    """Where a spectrum ends, Hz: some way beyond the highest mode."""
+def _highest_frequency(machine: Machine, expected: float, spectra: Sequence[Spectrum]) -> float:
+    """Where spectra end, Hz: beyond the highest line, and no farther than the modes explain."""
     modes = (*machine.tool.modes, *machine.workpiece.modes)
-    return _MODES_UP * max(mode.natural_frequency for mode in modes) / (2.0 * math.pi)
+    most = _MODES_UP * max(mode.natural_frequency for mode in modes) / (2.0 * math.pi)
+    top = max(float(s.amplitude.max(initial=0.0)) for s in spectra)
+    if top < _FAINTEST:
+        return most
+    lines = [s.frequency[s.amplitude > _HEARD * top].max(initial=expected) for s in spectra]
+    known = max(s.frequency.max(initial=0.0) for s in spectra)
+    return float(min(most, _LINES_UP * max(lines), known))
 
 
 def _draw_plane(

@@ -13,7 +13,6 @@ even; the modes are fitted to it with the factor that makes it of a receptance.
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -182,7 +181,7 @@ def _over_force(unit: str) -> bool:
     return unit.rpartition('/')[2].strip().lower() in _FORCES
 
 
-def _unit(text: str, path: Path) -> tuple[str, float]:
+def _unit(text: str, path: Path, column: str = '') -> tuple[str, float]:
     """Form and factor to SI of a unit: `um/N`, `g/N`, `(m/s^2)/lbf`, `(1/N)*(m/s²)`."""
     # What is no text of UTF-8 was a small two.
     plain = re.sub(r'[()*·^\s]', '', text.replace('²', '2').replace('\ufffd', '2'))
@@ -196,22 +195,24 @@ def _unit(text: str, path: Path) -> tuple[str, float]:
             if motion == length + suffix and scale:
                 return _name(order), factor / scale
     raise FrequencyResponseError(
-        f'{path}: the unit is {text!r}: it must be a length (m, mm, um, in), such a length /s or '
-        '/s2, or g, over a force (N, kN, lbf).'
+        f'{path}: the unit{column and f" of {column}"} is {text!r}: it must be a length (m, mm, '
+        'um, in), such a length /s or /s2, or g, over a force (N, kN, lbf).'
     )
 
 
 def _csv(path: Path) -> Iterator[FrequencyResponse]:
     """That of a CSV whose head names the columns and their units."""
     text = path.read_text(encoding='utf-8-sig', errors='replace')
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
+    numbered = enumerate(text.splitlines(), 1)
+    lines = [(k, line) for k, line in numbered if line.strip() and not line.startswith('#')]
     if not lines:
         raise FrequencyResponseError(f'{path} is empty.')
-    separator = next((mark for mark in (';', '\t', ',') if mark in lines[0]), ',')
-    rows = list(csv.reader(io.StringIO('\n'.join(lines)), delimiter=separator))
+    separator = next((mark for mark in (';', '\t', ',') if mark in lines[0][1]), ',')
+    rows = [(k, next(csv.reader([line], delimiter=separator))) for k, line in lines]
+    head = rows.pop(0)[1]
     columns: dict[str, int] = {}
     units: dict[str, str] = {}
-    for k, cell in enumerate(rows[0]):
+    for k, cell in enumerate(head):
         match = re.match(r'^\s*(\w+)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*$', cell)
         name = match[1].lower() if match else ''
         name = next((known for known in _COLUMNS if name and known.startswith(name)), name)
@@ -223,11 +224,14 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
                 f'{path}: its head must name frequency, and real and imaginary or magnitude and '
                 f'phase, and has no {name}.'
             )
-    try:
-        table = np.array([[float(c.replace(',', '.')) for c in row] for row in rows[1:]])
-    except ValueError as error:
-        raise FrequencyResponseError(f'{path}: {error}.') from None
-    form, scale = _unit(units[parts[0]] or '-', path)
+    if not units[parts[0]]:
+        raise FrequencyResponseError(
+            f'{path}: its head gives no unit of {parts[0]}: it must be there in parentheses, '
+            f'such as {parts[0]} (m/N).'
+        )
+    form, scale = _unit(units[parts[0]], path, parts[0])
+    table = np.array([_numbers(row, len(head), separator, f'{path}, line {k}') for k, row in rows])
+    table = table.reshape(-1, len(head))
     first, second = (table[:, columns[name]] for name in parts)
     if parts[0] == 'magnitude':
         turn = 1.0 if units['phase'].lower().startswith('rad') else np.pi / 180.0
@@ -240,6 +244,24 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
     coherence = table[:, columns['coherence']] if 'coherence' in columns else None
     measured = (response * scale).astype(np.complex128)
     yield FrequencyResponse(frequency, measured, form, coherence, str(path))
+
+
+def _numbers(row: list[str], columns: int, separator: str, where: str) -> list[float]:
+    """A row of the table; the comma of a decimal is a point."""
+    if len(row) != columns:
+        mark = {'\t': 'tabs'}.get(separator, repr(separator))
+        raise FrequencyResponseError(
+            f'{where}: it has {len(row)} of the {columns} columns that the head has, separated '
+            f'by {mark} as those of the head.'
+        )
+    return [_number(cell, where) for cell in row]
+
+
+def _number(cell: str, where: str) -> float:
+    try:
+        return float(cell.replace(',', '.'))
+    except ValueError:
+        raise FrequencyResponseError(f'{where}: {cell!r} is no number.') from None
 
 
 _COLUMNS = ('frequency', 'real', 'imaginary', 'magnitude', 'phase', 'coherence')

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip('sklearn')
-pytest.importorskip('pyarrow')
-
 EXAMPLE = Path(__file__).parents[2] / 'examples' / 'datasets'
 
 
 def test_a_forest_is_right_about_machines_that_it_has_never_seen(tmp_path: Path) -> None:
+    pytest.importorskip('sklearn')
+    pytest.importorskip('pyarrow')
     text = (EXAMPLE / 'chatter.yaml').read_text(encoding='utf-8')
     small = text.replace('machines: 150', 'machines: 60')
     assert small != text
@@ -29,3 +28,15 @@ def test_a_forest_is_right_about_machines_that_it_has_never_seen(tmp_path: Path)
     right, _, constant = second.partition('% right, where always the same answer would be ')
     assert float(right) >= 95.0
     assert float(constant.rstrip('%')) < 70.0
+
+
+def test_without_scikit_learn_the_forest_says_in_a_sentence_what_it_needs() -> None:
+    code = (
+        'import runpy, sys; sys.modules["sklearn"] = None; sys.argv = ["learn", "data"]; '
+        f'runpy.run_path({str(EXAMPLE / "learn_chatter.py")!r}, run_name="__main__")'
+    )
+    run = [sys.executable, '-c', code]
+    done = subprocess.run(run, check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    said = 'The forest needs scikit-learn, which is not installed: pip install scikit-learn\n'
+    assert done.stderr == said

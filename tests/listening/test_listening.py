@@ -15,8 +15,9 @@ from lathe_chatter.cli.main import main
 from lathe_chatter.detection import Estimate
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.listening import Judged, read_signals, score
+from lathe_chatter.listening import Judged, Signals, read_signals, score
 from lathe_chatter.listening.detector_score import Label, read_labels
+from lathe_chatter.listening.picture import draw_judged
 from lathe_chatter.model import Cut
 
 
@@ -105,6 +106,15 @@ def test_what_cannot_be_listened_to_is_one_sentence(
         path.write_text(text)
     with pytest.raises(SignalFileError, match=said):
         read_signals(path)
+
+
+def test_a_picture_has_the_unit_of_its_signal(tmp_path: Path) -> None:
+    samples = np.column_stack([np.arange(100) / 1e4, 1.5e-4 * np.sin(np.arange(100.0))])
+    for listened, label in (('tool_displacement', 'tool displacement / µm'), ('sound', 'sound')):
+        signals = Signals(('time', listened), samples)
+        path = tmp_path / f'{listened}.svg'
+        draw_judged(signals, listened, Judged((Estimate(0.01),)), [], path)
+        assert f'>{label}</text>' in path.read_text(encoding='utf-8')
 
 
 def test_a_spell_has_the_settled_figures_not_the_first() -> None:

@@ -67,7 +67,15 @@ def test_magnitude_and_phase_with_semicolons(tmp_path: Path) -> None:
         ('frequency (Hz),real (kg),imaginary (kg)\n1,2,3\n', "'kg'"),
         ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,x\n', "'x'"),
         ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n', 'at least 16'),
-        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2\n1,2,3\n', 'test.csv'),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2\n1,2,3\n', 'test.csv, line 2'),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n', 'at least 16'),
+        (
+            '# by hand\nfrequency (Hz);real (m/N);imaginary (m/N)\n\n3.0,1.0,2.0\n',
+            "line 4: it has 1 of the 3 columns that the head has, separated by ';'",
+        ),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n1,2,x\n', "line 3: 'x' is no number"),
+        ('frequency,real,imaginary\n1,2,3\n', 'no unit of real: it must be there in parentheses'),
+        ('frequency (Hz),magnitude (dB),phase (deg)\n1,2,3\n', "the unit of magnitude is 'dB'"),
     ],
 )
 def test_a_csv_that_cannot_be_used_is_a_sentence(tmp_path: Path, text: str, said: str) -> None:
