@@ -36,6 +36,8 @@ GROUPS = {
         'stability_probability',
         'smallest_lasting_knock',
         'plot_lobes',
+        'SpeedLaw',
+        'ProcessDamping',
     ),
     'Judging': ('ChatterDetector', 'Estimate'),
     'Recording': (

@@ -86,3 +86,12 @@ def test_an_unknown_parameter_is_named(tmp_path: Path, where: str) -> None:
     )  # fmt: skip
     with pytest.raises(ParameterError, match="'depth'"):
         simulate(scenario, tmp_path / 'run', monitor=False)
+
+
+def test_a_machine_file_that_lacks_a_body_is_warned_of_once(tmp_path: Path) -> None:
+    file = tmp_path / 'tool.yaml'
+    file.write_text('tool: {modes: [{frequency: 125 Hz, damping_ratio: 5 %, mass: 50 g}]}\n')
+    told: list[str] = []
+    scenario = Scenario('cut', 'A cut', 0.2, parameters={'machine': str(file)})
+    simulate(scenario, tmp_path / 'run', tell=lambda _now, what: told.append(what))
+    assert ['lacks a workpiece (50 g' in each for each in told] == [True]
