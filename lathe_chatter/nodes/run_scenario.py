@@ -18,7 +18,7 @@ from lathe_chatter.errors import NodeFailedError, RunFailedError
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
-from lathe_chatter.nodes.node_parameters import MONITOR, SUPERVISOR
+from lathe_chatter.nodes.node_parameters import MONITOR, SUPERVISOR, ModelSource
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.page.server import answers, free_port, open_in_browser
@@ -161,8 +161,14 @@ def _play(  # noqa: PLR0913, PLR0917 -- what is played, where to, and how
                 given = operator.scenario.parameters
                 cell.start(
                     'chatter_monitor',
-                    # The machine alone: of the cut it knows what the samples tell.
-                    parameter_arguments({name: given[name] for name in given if name in MONITOR}),
+                    # The machine alone: of the cut it knows what the samples tell. It need not ask
+                    # the lathe, whose answer may come after the first chatter on a busy machine.
+                    parameter_arguments(
+                        {
+                            'model': ModelSource.PARAMETERS.value,
+                            **{name: given[name] for name in given if name in MONITOR},
+                        }
+                    ),
                 )
                 if operator.scenario.supervisor is not None:
                     supervisor = _supervisor_of(operator.scenario)
