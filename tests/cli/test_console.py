@@ -148,6 +148,6 @@ def test_nothing_begins_with_an_empty_line(tmp_path: Path) -> None:
         check=True,
     )
     assert re.match(
-        r'0\.3 s simulated in \S+ s, \d+ times real time: 3000 samples\.\n', said.stdout
+        r'0\.3 s simulated in \S+ s, [\d.]+ times real time: 3000 samples\.\n', said.stdout
     )
     assert not said.stderr
