@@ -25,7 +25,6 @@ def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]: 
     page.start('chatter_monitor')
     page.start('chatter_supervisor', 'mode:=ask', 'hands_off:=0.5')
     page.start('lathe', 'bearing_contact:=none')
-    page.nodes.start('lathe', namespace='/second')
     yield page
     page.nodes.end()
     sys.stdout.write(page.nodes.said())
@@ -35,6 +34,8 @@ def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]: 
 def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
     url = f'{page.url()}#token={TOKEN.replace(" ", "%20")}'
     with looking_at(url, tmp_path_factory.mktemp('profile')) as browser:
+        # Only now: a page shows the lathe that it finds first.
+        page.nodes.start('lathe', namespace='/second')
         yield browser
 
 
