@@ -27,7 +27,6 @@ from lathe_chatter.nodes.topic_discovery import TopicWatch, selection
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence
 from lathe_chatter.recording.provenance import (
-    ENDED_EARLY,
     IDENTITY,
     PARAMETERS,
     PAUSES,
@@ -39,7 +38,7 @@ from lathe_chatter.recording.provenance import (
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
 from lathe_chatter.recording.recording_tally import RunLog
 from lathe_chatter.recording.ros_messages import LOG_TYPE
-from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.snapshot import SnapshotBuffer
 
 _COMMIT_PERIOD = 0.2
@@ -126,6 +125,11 @@ class RecorderNode(ParameterNode):
         return None if self._writer is None else self._writer.folder
 
     @property
+    def _sink(self) -> RunWriter | SnapshotBuffer | None:
+        """What takes the messages: a run, or the memory of the last seconds."""
+        return self._writer if self._snapshot is None else self._snapshot
+
+    @property
     def _topics(self) -> dict[str, RecordedTopic]:
         """What this run has, or the last one had, by full names."""
         return {} if self._watch is None else self._watch.topics
@@ -159,7 +163,7 @@ class RecorderNode(ParameterNode):
             self._snapshot = SnapshotBuffer(values['snapshot'])
         else:
             self._writer = self._folders.new_run(RunWriter)
-        sink: Any = self._writer or self._snapshot
+        sink: Any = self._sink
         self._failure = ''
         self._watch = TopicWatch(self, wanted, sink, self._write)
         self._log, self._stalls = RunLog(), ReceiveStalls()
@@ -183,25 +187,23 @@ class RecorderNode(ParameterNode):
 
     def stop(self, ended_early: str = '') -> Answer:
         """Finish the run, with everything that has arrived; also before its time, and why."""
-        if self._watch is None or (self._writer is None and self._snapshot is None):
+        if self._watch is None or self._sink is None:
             return _NOTHING
         self._look(closely=True)  # who came a moment ago is no riddle later
         self._log_news(last=True)
         self._watch.end()
-        if self._snapshot is not None:
-            self._snapshot = None
+        writer = self._sink
+        self._writer = self._snapshot = None
+        if isinstance(writer, SnapshotBuffer):
             return Answer(done=True, message='What was in memory is dropped.')
-        writer, self._writer = self._writer, None
-        if writer is None:
+        if writer is None:  # the disk took no more of what came last
             return _NOTHING
         try:
             writer.commit()
             if self._log.pauses:
                 writer.note(PAUSES, self._log.pause_values())
-            if ended_early:
-                writer.note(ENDED_EARLY, {'reason': ended_early})
             writer.note(RECEPTION, {**self._watch.reception(), **self._stalls.values()})
-            writer.note(SUMMARY, closing_summary(self._log, self._noted))
+            note_end(writer, self._log, self._noted, ended_early)
             writer.close()
         except (OSError, LatheChatterError) as error:
             said = str(error) if isinstance(error, LatheChatterError) else reason_of(error)
@@ -230,11 +232,10 @@ class RecorderNode(ParameterNode):
     def snapshot(self, reason: str) -> Answer:
         """Write what is in memory as a run of its own, and go on."""
         kept = self._snapshot
-        if kept is None:
+        if kept is None or self._watch is None:
             said = 'Nothing is kept in memory: the parameter snapshot says how long to keep it.'
             return Answer(done=False, message=said)
-        if self._watch is not None:
-            self._watch.take()
+        self._watch.take()
 
         def save(folder: Path, **options: Any) -> tuple[Path, int]:
             return folder, kept.save(folder, reason, self._noted, **options)
@@ -247,7 +248,7 @@ class RecorderNode(ParameterNode):
 
     def pause(self, *, pause: bool) -> Answer:
         """Leave out what comes from now on, or no longer; asking for what is so is no error."""
-        if self._watch is None or (self._writer is None and self._snapshot is None):
+        if self._watch is None or self._sink is None:
             return _NOTHING
         if pause == self._watch.paused:
             return Answer(done=True, message='It is so already.')
@@ -261,7 +262,8 @@ class RecorderNode(ParameterNode):
 
         Raises:
             RecordingFailedError: If its end is not on disk.
-        """  # Kilted destroys nodes, too, that were refused half-made.
+        """
+        # Kilted destroys nodes, too, that were refused half-made.
         if getattr(self, '_writer', None) is None:
             return
         done, said = self.stop(ended_by(sys.exc_info()[1]))
@@ -274,19 +276,19 @@ class RecorderNode(ParameterNode):
 
     def _look(self, *, closely: bool = False) -> None:
         """Follow the graph: topics and nodes that have appeared."""
-        if self._watch is not None and (self._writer or self._snapshot is not None):
+        if self._watch is not None and self._sink is not None:
             self._watch.look(self._remote.want, closely=closely)
             self._remote.look()
 
     def _take(self) -> None:
         """Take what has arrived."""
-        if self._watch is None or (self._writer is None and self._snapshot is None):
+        if self._watch is None or self._sink is None:
             return
         step = self._clock_watch.look()
         if step is not None:
             for received in self._log.samples.values():
                 received.clock_stepped(round(step.seconds * 1e9))
-            (self._writer or self._snapshot).note(CLOCK, self._clock_watch.values())  # type: ignore[union-attr]
+            self._sink.note(CLOCK, self._clock_watch.values())
             self.get_logger().warning(f'Noted: {step_sentence(step.seconds)}')
         self._stalls.note(time.monotonic())
         self._watch.take()
@@ -301,10 +303,9 @@ class RecorderNode(ParameterNode):
         self, name: str, data: bytes, log_time: int, publish_time: int, number: int
     ) -> None:
         """Write a message as it came."""
-        sink: Any = self._writer if self._snapshot is None else self._snapshot
-        if sink is None:
+        if self._sink is None:
             return
-        sink.write(name, data, log_time=log_time, publish_time=publish_time, sequence=number)
+        self._sink.write(name, data, log_time=log_time, publish_time=publish_time, sequence=number)
         kind = self._topics[name].topic.type
         if self._awaited and kind == LOG_TYPE and self._awaited in data:
             self._awaited = b''
@@ -312,11 +313,10 @@ class RecorderNode(ParameterNode):
 
     def _note_parameters(self, node: str, parameters: dict[str, Any]) -> None:
         """Keep what another node was asked for, and when it answered."""
-        sink = self._writer if self._snapshot is None else self._snapshot
-        if sink is not None:
+        if self._sink is not None:
             answers = self._noted.setdefault(node, [])
             answers.append((parameters, time.time_ns()))
-            sink.note(PARAMETERS + node, parameter_values(answers))
+            self._sink.note(PARAMETERS + node, parameter_values(answers))
 
     # -- what is done with it --------------------------------------------------------------
 

@@ -11,7 +11,6 @@ from typing import Any
 from lathe_chatter.array_types import Array
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
 from lathe_chatter.recording.provenance import (
-    ENDED_EARLY,
     IDENTITY,
     PARAMETERS,
     ended_by,
@@ -27,7 +26,7 @@ from lathe_chatter.recording.ros_messages import (
     parameters_bytes,
     topic_of_type,
 )
-from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
@@ -140,10 +139,8 @@ class LatheRun(AbstractContextManager['LatheRun']):
         if self._closed:
             return
         self._closed = True
-        if ended_early:
-            self.writer.note(ENDED_EARLY, {'reason': ended_early})
-        summary = closing_summary(self._log, {self.name: [(self._parameters, self._begun)]})
-        self.writer.note(SUMMARY, summary)
+        told = {self.name: [(self._parameters, self._begun)]}
+        note_end(self.writer, self._log, told, ended_early)
         self.writer.close()
 
     def abandon(self) -> None:

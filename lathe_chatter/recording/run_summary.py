@@ -11,10 +11,34 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import cut_from, machine_from
 from lathe_chatter.recording.cut_log import CutSession
+from lathe_chatter.recording.provenance import ENDED_EARLY
 from lathe_chatter.recording.recording_tally import RunLog, SamplesReceived
+from lathe_chatter.recording.run_writer import RunWriter
 
 SUMMARY = 'lathe_chatter/summary'
 """Name of the record; every value is JSON."""
+
+
+def note_end(
+    writer: RunWriter,
+    log: RunLog,
+    parameters: Mapping[str, Sequence[tuple[Mapping[str, Any], int]]],
+    ended_early: str = '',
+) -> None:
+    """Note what a run holds, and what happened, before it is closed.
+
+    Args:
+        writer: Of the run.
+        log: Of the run.
+        parameters: As for `closing_summary`.
+        ended_early: Why it has not all that it was to have, a sentence; else empty.
+
+    Raises:
+        OSError: If the disk refuses.
+    """
+    if ended_early:
+        writer.note(ENDED_EARLY, {'reason': ended_early})
+    writer.note(SUMMARY, closing_summary(log, parameters))
 
 
 def closing_summary(

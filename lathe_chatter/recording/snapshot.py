@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from lathe_chatter.recording.metadata import Topic
 from lathe_chatter.recording.recording_tally import RunLog
-from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
+from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 
 SNAPSHOT = 'lathe_chatter/snapshot'
@@ -116,6 +116,6 @@ class SnapshotBuffer:
                 writer.write(each.topic.name, each.data, **stamps, sequence=each.sequence)
                 log.receive(each.topic.name, each.topic.type, each.data, *stamps.values())
             writer.note(SNAPSHOT, {'seconds': f'{self.seconds:g}', 'reason': reason})
-            writer.note(SUMMARY, closing_summary(log, parameters))
+            note_end(writer, log, parameters)
             writer.commit()
         return len(messages)
