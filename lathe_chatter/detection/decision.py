@@ -112,6 +112,21 @@ def _grows(windows: Records) -> bool:
 
 
 @compiled(borrows=True, inner=True)
+def _trust(windows: Records) -> float:
+    """How far the signal stands out of the sensors' noise, from 0 to 1, with a model."""
+    clear: float = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0)
+    return clear
+
+
+@compiled(borrows=True, inner=True)
+def _after_step(now: Any, trust: float) -> float:
+    """By how much more the energy must have risen, for it may be compared with another cut's."""
+    if now.stepped == 0:
+        return 1.0
+    return _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
+
+
+@compiled(borrows=True, inner=True)
 def _score(state: DetectorState, windows: Records, model: bool, forced: bool) -> float:
     """1 is an alarm."""
     now = state.now[0]
@@ -124,7 +139,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
         if dies_down:
             rise = np.nan
     short = windows[1] if model else windows[2]
-    trust = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0) if model else 1.0
+    trust = _trust(windows) if model else 1.0
     sureness = short.growth / short.growth_error
     if rise == rise and now.holding == 0:
         score = rise
@@ -134,8 +149,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
             score /= _ENERGY_LIMIT * (_BLURRED + (1.0 - _BLURRED) * trust)
         else:
             score /= _ENERGY_ALONE
-        if now.stepped != 0:
-            score /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
+        score /= _after_step(now, trust)
         first = 0 if model else _SHORTEST_BY_ENERGY
         if trust >= 0.5 and _surely_stable(windows, first, _TRUSTED + 1):
             score = min(score, _VETO)
@@ -188,21 +202,22 @@ def _unchecked_score(
             chip += hop.chip_chip
         coherent = both > 0.0 and both * both > _COHERENT * force * chip
         return max(full, plain) if coherent else plain
-    trust = min(max((windows[_TRUSTED].clearness - 0.3) / 0.4, 0.0), 1.0)
+    trust = _trust(windows)
     if now.rise == now.rise and trust < 1.0:
         limit = _ENERGY_LIMIT * _BLURRED * (1.0 - trust) + _ENERGY_ALONE * trust
-        blurred: float = now.rise / limit
-        if now.stepped != 0:
-            blurred /= _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
+        blurred: float = now.rise / limit / _after_step(now, trust)
         return max(plain, blurred)
     return plain
 
 
 @compiled(borrows=True, inner=True)
 def _saturated(
-    state: DetectorState, products: Records, newest: int, strongest: int, stiff: float, grows: bool
+    state: DetectorState, products: Records, newest: int, strongest: int, stiff: float, length: int
 ) -> bool:
-    """Whether the chatter has grown as far as it can: it is steady, and not the spindle's own."""
+    """Whether the chatter has grown as far as it can: it is steady, and not the spindle's own.
+
+    Over `length` hops, which are all that are remembered, or where the cut grows `_SHORT`.
+    """
     now = state.now[0]
     if not now.once_per_turn > _ON_PHASE:
         return False
@@ -217,8 +232,7 @@ def _saturated(
         usual = now.usual_misfit if now.usual_misfit == now.usual_misfit else 0.0
         if pulsation > _OUT_OF_CUT * mean and mean > 10.0 * math.sqrt(usual):
             return True
-    # Where the cut grows, by the machine, a shorter time says enough.
-    length, limit = (_SHORT, _STEADIER) if grows else (HOPS, _STEADY)
+    limit = _STEADIER if length == _SHORT else _STEADY
     total = squares = 0.0
     for back in range(length):
         energy = abs(state.motion[(newest - back) % HOPS, strongest]) ** 2
@@ -335,10 +349,10 @@ def judge(
     # A force that would make C w negative is none.
     sound = model and identified[WINDOWS.size - 1].cutting > 0.0
     stiff = settings.tool_stiffness if sound else 0.0
-    grows = model and _grows(identified)
-    shortest = _SHORT if grows else HOPS
-    if now.alarmed == 0 and now.ramping == 0 and speed > 0.0 and now.hops_seen >= shortest:
-        steady = _saturated(state, products, newest, strongest, stiff, grows)
+    # Where the cut grows, by the machine, a shorter time says enough.
+    length = _SHORT if model and _grows(identified) else HOPS
+    if now.alarmed == 0 and now.ramping == 0 and speed > 0.0 and now.hops_seen >= length:
+        steady = _saturated(state, products, newest, strongest, stiff, length)
         # Roundings are steady too.
         steady = steady and amplitude > now.smallest_amplitude
         now.saturated = now.saturated + 1 if steady else 0

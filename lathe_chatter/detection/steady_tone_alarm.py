@@ -66,7 +66,7 @@ class SteadyToneAlarm:
         share = _with_neighbour(powers[best], place) / total
         audible = total > _QUIET * self._loudest
         if self._angle and audible:
-            self._hear_rise()
+            self._alarm_by_rise()
         self._weigh(self._judges[best], place, share if audible else 0.0)
         for k, judge in enumerate(self._judges):
             now = judge.state.now[0]
@@ -78,7 +78,7 @@ class SteadyToneAlarm:
                 if now.line_gone >= _LOOKS_GONE:
                     judge.end_alarm()
 
-    def _hear_rise(self) -> None:
+    def _alarm_by_rise(self) -> None:
         """Raise the alarm where a band's energy has risen enough, and a line holds the newest."""
         judge = max(self._judges, key=lambda each: float(each.state.now[0].score))
         now = judge.state.now[0]
