@@ -87,7 +87,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             found[part] = every[part](options)
             if not options.json:
                 print('\n'.join(found[part]), flush=True)
-
     if options.json:
         print(json.dumps(found, indent=2))
     else:

@@ -23,13 +23,13 @@ from lathe_chatter.recording.sample_series import Selection
 EXAMPLE = 'lathe-chatter export runs/20260401-120000 --columns tool_displacement --start 3'
 
 _FILES = {'csv': to_csv, 'parquet': to_parquet, 'mat': to_mat, 'hdf5': to_hdf5}
-_SUFFIXES = {'hdf5': '.h5', 'unrolled': '-unrolled'}
 _OF_FORMAT = {
     'csv': ('.csv',),
     'parquet': ('.parquet',),
     'mat': ('.mat',),
     'hdf5': ('.h5', '.hdf5'),
 }
+"""Endings of the files of each format, the usual one first."""
 _ENDINGS = {each for endings in _OF_FORMAT.values() for each in endings} | set(PICTURES)
 """Endings that say what a file is."""
 
@@ -63,7 +63,7 @@ def run(options: Namespace) -> int:
     """Export."""
     form = 'unrolled' if options.unrolled else options.format
     source: Path = options.run_path
-    suffix = _SUFFIXES.get(form, f'.{form}')
+    suffix = '-unrolled' if options.unrolled else _OF_FORMAT[form][0]
     path = options.output or source.with_name(f'{source.stem}{suffix}')
     columns = None
     if options.columns is not None:

@@ -115,6 +115,7 @@ def run(options: Namespace) -> int:
 
 
 def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
+    spells = judged.spells()
     rows = [
         (
             f'{each.time:.2f}',
@@ -122,7 +123,7 @@ def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
             _known(each.frequency, '.1f'),
             _known(each.growth_rate, '+.2f'),
         )
-        for each in judged.spells()
+        for each in spells
     ]
     titles = {
         'from / s': 'right',
@@ -133,7 +134,7 @@ def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
     screen.table(titles, rows)
     screen.say(f'works with  {judged.estimates[-1].mode.value}')
     screen.say(f'flagged     {judged.flagged.mean():.1%} of the time')
-    lines = [each for each in judged.spells() if each.chatter and math.isfinite(each.frequency)]
+    lines = [each for each in spells if each.chatter and math.isfinite(each.frequency)]
     if lines and not judged.estimates[-1].mode.sees_spindle:
         hertz = ', '.join(dict.fromkeys(f'{each.frequency:.1f}' for each in lines))
         screen.say(

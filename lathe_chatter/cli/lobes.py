@@ -129,7 +129,7 @@ def run(options: Namespace) -> int:
     try:
         with executor_of(options, screen) as executor:
             wide = _Wide(screen, executor, kept)
-            growth, probability = _coloured(options, config, limits, (low, high, top), wide)
+            growth, probability = _coloured(options, config, limits, known, top, wide)
     except KeyboardInterrupt:
         screen.say(f'Interrupted: the same call goes on from {kept}.')
         return INTERRUPTED
@@ -163,8 +163,12 @@ def _tables(options: Namespace, config: LatheConfig) -> list[Path]:
         return []
     if options.csv.suffix in PICTURES:
         raise ParameterError('--csv', str(options.csv), '', 'another file than a picture')
-    mapped = options.map or config.cut.speed_variation_amplitude > 0.0
-    return [options.csv, *([_map_file(options.csv)] if mapped else [])]
+    return [options.csv, *([_map_file(options.csv)] if _is_mapped(options, config) else [])]
+
+
+def _is_mapped(options: Namespace, config: LatheConfig) -> bool:
+    """Whether the chart is coloured with growth rates: where asked for, and where speed varies."""
+    return bool(options.map or config.cut.speed_variation_amplitude > 0.0)
 
 
 def _speed_range(options: Namespace, config: LatheConfig) -> tuple[float, float]:
@@ -184,15 +188,15 @@ class _Wide(NamedTuple):
     kept: Path
 
 
-def _coloured(
-    options: Namespace, config: LatheConfig, limits: SafeLimit,
-    span: tuple[float, float, float], wide: _Wide,
+def _coloured(  # noqa: PLR0913, PLR0917 -- what is drawn, and where
+    options: Namespace, config: LatheConfig, limits: SafeLimit, known: Uncertainty | None,
+    top: float, wide: _Wide,
 ) -> tuple[GrowthMap | None, StabilityProbability | None]:  # fmt: skip
     """What the chart is coloured with: growth rates, a probability, or nothing."""
-    known = _uncertainty(options, config)
     try:
-        if options.map or config.cut.speed_variation_amplitude > 0.0:
-            return _map(config, *span, SpeedLaw(options.law), wide), None
+        if _is_mapped(options, config):
+            low, high = limits.spindle_speed_rpm[[0, -1]]
+            return _map(config, low, high, top, SpeedLaw(options.law), wide), None
         return None, _probability(config, known, limits, wide) if known else None
     except UnprovenError:  # no other call would get further from there
         wide.kept.unlink(missing_ok=True)

@@ -29,6 +29,8 @@ from lathe_chatter.scenario import (
 from lathe_chatter.supervisor import Mode
 
 EXAMPLE = 'lathe-chatter run --scenario no_clearance --output runs/without'
+_PAGE_NOISE = 0.001
+"""Of the force, N/sqrt(Hz): that of a calm workshop."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -49,8 +51,8 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         '--page', action='store_true',
         help="open the operator's page in the browser and play nothing: whoever has it open "
-        'operates, and may play scenarios, until Ctrl-C; the force has a little noise, 0.001 '
-        'N/sqrt(Hz), unless the scenario says otherwise',
+        'operates, and may play scenarios, until Ctrl-C; the force has a little noise, '
+        f'{_PAGE_NOISE} N/sqrt(Hz), unless the scenario says otherwise',
     )  # fmt: skip
     parser.add_argument(
         '--supervise',
@@ -58,10 +60,6 @@ def configure(parser: ArgumentParser) -> None:
         help='have a supervisor too, that watches, waits for ~/accept, or acts',
     )
     add_json(parser)
-
-
-_PAGE_NOISE = 0.001
-"""Of the force, N/sqrt(Hz): that of a calm workshop."""
 
 
 def run(options: Namespace) -> int:
