@@ -226,16 +226,23 @@ def plot_lobes(
 def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:
     """Growth rate as colour, white where a vibration neither grows nor decays."""
     from matplotlib.colors import TwoSlopeNorm
+    from matplotlib.ticker import MaxNLocator
 
     low, high = float(growth.growth_rate.min()), float(growth.growth_rate.max())
     least = _LEAST_SHADE * max(-low, high) or 1.0
+    scale = TwoSlopeNorm(0.0, min(low, -least), max(high, least))
     # Grey to orange by way of white: the lines over it keep their colours.
     colours = axes.pcolormesh(
         growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
-        cmap='PuOr_r', norm=TwoSlopeNorm(0.0, min(low, -least), max(high, least)),
+        cmap='PuOr_r', norm=scale,
         shading='gouraud', rasterized=True,
     )  # fmt: skip
-    axes.figure.colorbar(colours, ax=axes, label='growth rate / s$^{-1}$', pad=0.01)
+    # Either side has a scale of its own, and needs figures of its own.
+    sides = [MaxNLocator(4).tick_values(0.0, end) for end in (scale.vmin, scale.vmax)]
+    ticks = [tick for tick in np.unique(sides[0].tolist() + sides[1].tolist())
+             if scale.vmin <= tick <= scale.vmax]  # fmt: skip
+    label = 'growth rate / s$^{-1}$'
+    axes.figure.colorbar(colours, ax=axes, label=label, pad=0.01, ticks=ticks)
     if zero:
         axes.contour(
             growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
