@@ -230,17 +230,16 @@ def _draw_growth(axes: Axes, growth: GrowthMap, *, zero: bool) -> None:
 
     low, high = float(growth.growth_rate.min()), float(growth.growth_rate.max())
     least = _LEAST_SHADE * max(-low, high) or 1.0
-    scale = TwoSlopeNorm(0.0, min(low, -least), max(high, least))
+    lowest, highest = min(low, -least), max(high, least)
     # Grey to orange by way of white: the lines over it keep their colours.
     colours = axes.pcolormesh(
         growth.spindle_speed_rpm, growth.depth_of_cut * _MILLI, growth.growth_rate,
-        cmap='PuOr_r', norm=scale,
+        cmap='PuOr_r', norm=TwoSlopeNorm(0.0, lowest, highest),
         shading='gouraud', rasterized=True,
     )  # fmt: skip
     # Either side has a scale of its own, and needs figures of its own.
-    sides = [MaxNLocator(4).tick_values(0.0, end) for end in (scale.vmin, scale.vmax)]
-    ticks = [tick for tick in np.unique(sides[0].tolist() + sides[1].tolist())
-             if scale.vmin <= tick <= scale.vmax]  # fmt: skip
+    sides = [MaxNLocator(4).tick_values(0.0, end) for end in (lowest, highest)]
+    ticks = [tick for tick in np.unique(np.concatenate(sides)) if lowest <= tick <= highest]
     label = 'growth rate / s$^{-1}$'
     axes.figure.colorbar(colours, ax=axes, label=label, pad=0.01, ticks=ticks)
     if zero:
