@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -114,7 +115,7 @@ class Reader:
             self._nodes.append(node)
             return
         if shutil.which('ros2') is None and command.startswith('ros2 '):
-            command = f'{sys.executable} -m support.ros2_commands {command[5:]}'
+            command = f'{shlex.quote(sys.executable)} -m support.ros2_commands {command[5:]}'
         self._check(['bash', '-c', command], command, fails=fails)
 
     def _check(self, words: list[str], typed: str, *, fails: bool = False) -> None:
