@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -203,3 +204,27 @@ def test_the_core_that_a_run_names_is_what_a_lathe_imports(tmp_path: Path) -> No
     without_code = {file for file in loaded | named if file.name == '__init__.py'}
     left_out = {PACKAGE / name for name in NO_BITS}
     assert named - without_code == loaded - without_code - left_out
+
+
+def test_texts_name_modules_that_are_there() -> None:
+    """A module that has another name now would leave docstrings that lead nowhere."""
+    folders = ('lathe_chatter', 'benchmarks', 'tests', 'examples')
+    files = [file for folder in folders for file in sources(ROOT / folder)]
+    names = {file.name for file in files} | {'a_program.py', 'rclpy.py'}  # what tests make
+    texts = {
+        (file.parent if file.stem == '__init__' else file).stem: file.read_text(encoding='utf-8')
+        for file in sources()
+    }
+    lost = []
+    for file in [*files, *ROOT.glob('docs/**/*.md'), *ROOT.glob('*.md')]:
+        text = file.read_text(encoding='utf-8')
+        mentioned = set(re.findall(r'(?<![\w.*{}])([a-z]\w*\.py)\b', text)) - names
+        lost += [f'{file.name}: {name}' for name in mentioned if name != 'setup.py']
+        if file.is_relative_to(PACKAGE):
+            lost += [
+                f'{file.name}: {module}.{symbol}'
+                for module, symbol in re.findall(r'`([a-z]\w*)\.(\w+)`', text)
+                if module not in {'sys', 'tool', 'now', 'scratch'}
+                and symbol not in texts.get(module, '')
+            ]
+    assert not lost, '\n'.join(lost)

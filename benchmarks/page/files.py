@@ -55,12 +55,9 @@ def _size_of(name: str) -> int:
 
 def lines() -> Iterator[str]:
     """Lines of source."""
-    nodes = [PACKAGE / 'nodes' / f'{name}.py' for name in _NODES]
+    nodes = PACKAGE.glob('nodes/operator_page*.py')
     python = [*STATIC.parent.glob('*.py'), *nodes, PACKAGE / 'cli' / 'page.py']
     scripts = [STATIC / f'{name}.js' for name in ('page', 'draw', 'recorded')]
     for kind, places in (('Python', python), ('JavaScript', scripts)):
         count = sum(len(place.read_text().splitlines()) for place in places)
         yield f'{count} lines of {kind} in {len(places)} files'
-
-
-_NODES = ('operator_page_node', 'operated_cell', 'cell_clients')

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -13,7 +14,12 @@ from lathe_chatter.cli.common_options import add_json, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
-from lathe_chatter.errors import RunFailedError, RunReadError
+from lathe_chatter.errors import (
+    NodeFailedError,
+    RunFailedError,
+    RunReadError,
+    ScenarioFailedError,
+)
 from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.nodes.end_signals import DeferredSignals
@@ -23,6 +29,7 @@ from lathe_chatter.report.run_history import read_history
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,
+    Scenario,
     find_scenario,
     load_scenario,
 )
@@ -63,21 +70,13 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Play the scenario; 0 if the monitor said what the scenario expects, else 1."""
+    """Play the scenario; 0 if the monitor said what the scenario expects, else 1.
+
+    Raises:
+        LatheChatterError: If it failed; what was recorded until then is reported before.
+    """
     file = utf8('--scenario', find_scenario(options.scenario))
-    scenario = load_scenario(file)
-    if options.machine is not None:
-        load_machine(options.machine)
-        parameters = {**scenario.parameters, MACHINE_FILE.name: options.machine}
-        scenario = replace(scenario, parameters=parameters)
-    if options.page and 'force_noise' not in scenario.parameters:
-        # Without any, a stable cut is at rest, and the page has neither growth nor margin to show.
-        scenario = replace(
-            scenario, parameters={**scenario.parameters, 'force_noise': _PAGE_NOISE}
-        )
-    if options.supervise is not None:
-        supervisor = {**(scenario.supervisor or {}), 'mode': options.supervise}
-        scenario = replace(scenario, supervisor=supervisor)
+    scenario = _scenario(file, options)
     output = options.output or Path('runs', f'{datetime.now().astimezone():%Y%m%d-%H%M%S}')
     if utf8('--output', output).exists():
         raise RunFailedError(f'{output} exists already: give another --output.')
@@ -86,7 +85,14 @@ def run(options: Namespace) -> int:
         screen.say(f'{scenario.title}  (scenario {scenario.name})', 'bold')
     play = _player()
     screen.compile()
-    interrupted = play(scenario, file, output, screen, page=options.page)
+    try:
+        interrupted = play(scenario, file, output, screen, page=options.page)
+    except (NodeFailedError, RunFailedError, ScenarioFailedError):
+        if _has_samples(output):
+            screen.say('It has failed: the run is reported up to then ...')
+            with suppress(RunReadError):
+                screen.json(show_run(read_history(output), screen))
+        raise
     if interrupted and not _has_samples(output):
         shutil.rmtree(output, ignore_errors=True)  # else it would pass for a run
         screen.say('Interrupted while the nodes were still starting: nothing was recorded.')
@@ -106,6 +112,24 @@ def run(options: Namespace) -> int:
         CLEARED: bool(history.flags) and not history.flags[-1].chatter,
     }
     return verdict(scenario, said, screen)
+
+
+def _scenario(file: Path, options: Namespace) -> Scenario:
+    """The scenario of a file with what the options say otherwise."""
+    scenario = load_scenario(file)
+    if options.machine is not None:
+        load_machine(options.machine)
+        parameters = {**scenario.parameters, MACHINE_FILE.name: options.machine}
+        scenario = replace(scenario, parameters=parameters)
+    if options.page and 'force_noise' not in scenario.parameters:
+        # Without any, a stable cut is at rest, and the page has neither growth nor margin to show.
+        scenario = replace(
+            scenario, parameters={**scenario.parameters, 'force_noise': _PAGE_NOISE}
+        )
+    if options.supervise is not None:
+        supervisor = {**(scenario.supervisor or {}), 'mode': options.supervise}
+        scenario = replace(scenario, supervisor=supervisor)
+    return scenario
 
 
 def _has_samples(output: Path) -> bool:

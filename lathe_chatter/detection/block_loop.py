@@ -100,10 +100,10 @@ def take_hops(
 
     Args:
         block: Spindle angle, tool and workpiece displacement (n, 3), n a multiple of the hop.
-        settings_: One record of `signals.SETTINGS`.
-        mechanics_: From `identification.mechanics_of`.
-        noise_: One record of `identification.NOISE_SUMS`, to work in.
-        total_: One record of `signals.HOP_SUMS`, to work in.
+        settings_: One record of `signal_conditioning.SETTINGS`.
+        mechanics_: From `cut_identification.mechanics_of`.
+        noise_: One record of `cut_identification.NOISE_SUMS`, to work in.
+        total_: One record of `signal_conditioning.HOP_SUMS`, to work in.
         kernels: From `filter_design.design`.
         memory: Of the signals, changed in place.
         products: Sums of the last hops (HOPS,), a ring, changed in place.

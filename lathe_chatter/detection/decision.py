@@ -279,9 +279,9 @@ def judge(
 
     Args:
         state: Changed in place; `now.newest` is its place in the rings.
-        settings: A record of `signals.SETTINGS`.
+        settings: A record of `signal_conditioning.SETTINGS`.
         products: Sums of the last hops (HOPS,), as a ring.
-        identified: From `identification.identify`, where there is a model.
+        identified: From `cut_identification.identify`, where there is a model.
         plain: With the powers; growth is written here.
         phases: Once-per-turn statistics.
         poles: Of the resonators, per hop (bins,).

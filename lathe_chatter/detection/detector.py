@@ -113,7 +113,7 @@ class ChatterDetector:
 
         Args:
             samples: Rows in order of time (n, columns).
-            columns: What the columns are, as in `model.SAMPLE_COLUMNS`.
+            columns: What the columns are, as in `samples.SAMPLE_COLUMNS`.
 
         Returns:
             What is known after the last of them.

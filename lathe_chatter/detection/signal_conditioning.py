@@ -245,7 +245,7 @@ def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, produc
     Args:
         block: Spindle angle, tool and workpiece displacement (n, 3), rev and m.
         settings: A record of `SETTINGS`.
-        kernels: From `kernels.design`.
+        kernels: From `filter_design.design`.
         memory: Changed in place.
         products: A record of `HOP_SUMS`, written.
     """

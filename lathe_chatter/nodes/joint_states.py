@@ -30,7 +30,7 @@ def joint_states(sample: Array, stamp: int) -> JointState:
     """One sample as two prismatic joints.
 
     Args:
-        sample: (8,), columns as in `model.SAMPLE_COLUMNS`.
+        sample: (8,), columns as in `samples.SAMPLE_COLUMNS`.
         stamp: When, ns.
 
     Returns:

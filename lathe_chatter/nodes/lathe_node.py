@@ -66,7 +66,7 @@ class LatheNode(ParameterNode):
 
     Args:
         by_timer: Whether a timer wakes it, so that any executor will do; else its loop calls
-            `wake` (`real_time.spin_in_ticks`). Under `use_sim_time` there is a timer in any case.
+            `wake` (`real_time_loop.spin_in_ticks`). Under `use_sim_time` there is a timer anyway.
         options: As for `rclpy.node.Node`.
 
     Raises:

@@ -71,7 +71,7 @@ class MonitorNode(ParameterNode):
 
     Args:
         by_timer: Whether a timer lets it look at the samples, so that any executor will do; else
-            its loop calls `wake` (`real_time.spin_in_ticks`).
+            its loop calls `wake` (`real_time_loop.spin_in_ticks`).
         options: As for `rclpy.node.Node`.
 
     Raises:
@@ -96,6 +96,7 @@ class MonitorNode(ParameterNode):
         self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
         self._state, self._flag = _UNKNOWN, False
+        self._flag_since = math.nan
         self._logged_advice = Advice()
         self._mode = Mode.WAITING
         self._faults: tuple[str, ...] = ()
@@ -197,7 +198,7 @@ class MonitorNode(ParameterNode):
             self._say('restart', f'At {before:.6f} s: {again}.')
         if self._flag:
             self._say('withdrawn', withdrawn(times[0]))
-            self._set_flag(raised=False)
+            self._set_flag(times[0], raised=False)
         self._detector = self._new_detector()
         self._next_report = -math.inf
         if self._asked is not None:
@@ -281,7 +282,7 @@ class MonitorNode(ParameterNode):
         if estimate.mode is not self._mode:
             self._say_machine_fit(estimate)
         if estimate.chatter != self._flag:
-            self._set_flag(raised=estimate.chatter)
+            self._set_flag(estimate.time, raised=estimate.chatter)
             if self._flag:
                 self._say('onset', onset(estimate))
             else:
@@ -302,8 +303,8 @@ class MonitorNode(ParameterNode):
             fits = 'the machine fits what is heard, and is believed again'
             self._say('machine fits', f'At {estimate.time:.6f} s: {fits}.')
 
-    def _set_flag(self, *, raised: bool) -> None:
-        self._flag = raised
+    def _set_flag(self, at: float, *, raised: bool) -> None:
+        self._flag, self._flag_since = raised, at
         self._flag_publisher.publish(Bool(data=raised))
 
     def _set_state(self, state: str) -> None:
@@ -347,7 +348,8 @@ class MonitorNode(ParameterNode):
         self._reported = _Reported(self._heard_at, self._continuity.lost)
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
-        cut = {'state': self._state, 'flag': self._flag, **self._figures, **self._details}
+        since = {'flag since, s': self._flag_since} if self._flag_since > -math.inf else {}
+        cut = {'state': self._state, 'flag': self._flag, **since, **self._figures, **self._details}
         # Whether the chatter of a flag that is up goes on is not known then.
         level = WARN if self._silent and self._flag else _LEVELS.get(self._state, OK)
         return [

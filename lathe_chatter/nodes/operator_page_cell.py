@@ -67,7 +67,6 @@ class OperatedCell:
         self._decoder = SampleDecoder()
         self._figures: dict[str, tuple[float, float]] = {}
         self._sentences: deque[dict[str, Any]] = deque(maxlen=_SHOWN_SENTENCES)
-        self._flag: bool | None = None
         self._chart_of: Any = None
         self._charting = False
         self._tasks: set[asyncio.Task[Any]] = set()
@@ -150,11 +149,8 @@ class OperatedCell:
                 self.clients.values.pop('lathe', None)  # it may be another one
 
     def _on_flag(self, message: Bool) -> None:
-        """The lamp; where it was lit before the page listened, nobody here knows since when."""
-        if self._flag != message.data:
-            since = None if self._flag is None else self._signals.time
-            self.board.put('flag', {'up': message.data, 'since': since})
-        self._flag = message.data
+        """The lamp; since when it is lit or out, the monitor's diagnostics say."""
+        self.board.put('flag', {'up': message.data, 'since': None})
         if self._player is not None:
             found = [self._figures.get(n, (math.nan,))[0] for n in ('frequency', 'growth_rate')]
             self._player.on_flag(self._signals.time, *found, up=message.data)

@@ -66,7 +66,7 @@ class RecorderNode(ParameterNode):
 
     Args:
         by_timer: Whether timers let it work, so that any executor will do; else its loop calls
-            `wake` (`real_time.spin_in_ticks`), which costs a third.
+            `wake` (`real_time_loop.spin_in_ticks`), which costs a third.
         options: As for `rclpy.node.Node`.
 
     Raises:

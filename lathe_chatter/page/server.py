@@ -1,7 +1,7 @@
 """Serves a page and what it shows, and lets one viewer at a time act.
 
 A page asks for each frame when it has drawn the last one: who is slow gets fewer, and nothing
-piles up anywhere. Frames are those of `board.encode_frame`; what a page sends is JSON.
+piles up anywhere. Frames are those of `versioned_values.encode_frame`; what a page sends is JSON.
 
 A foreign page in the same browser is kept out by the headers Host (no name but this machine's
 leads here) and Origin (a socket is opened by this page alone); on other hosts a token, without

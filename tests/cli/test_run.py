@@ -233,6 +233,41 @@ def test_a_refused_step_ends_the_run_with_the_reason(
     assert 'depth_of_cut' in done.stderr
     assert '0.1 m' in done.stderr
     assert 'Traceback' not in done.stdout + done.stderr
+    assert (tmp_path / 'run' / 'report.png').is_file()
+
+
+def test_a_lathe_that_is_killed_ends_the_run_with_a_report(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    scenario = tmp_path / 'short.yaml'
+    scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 30.0'))
+    output = tmp_path / 'run'
+    with subprocess.Popen(
+        command('--scenario', str(scenario), '--output', str(output)),
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        seen = []
+        for line in process.stdout:
+            seen.append(line)
+            if 'depth_of_cut = 0.00062' in line:
+                kill_the_lathe_of(process.pid)
+        assert process.wait(60) == 2, ''.join(seen)
+    said = ''.join(seen)
+    assert 'lathe was ended by the signal SIGKILL.' in said
+    assert 'reported up to then' in said
+    assert (output / 'report.png').is_file()
+    assert main(['verify', str(output)]) == 0
+
+
+def kill_the_lathe_of(run: int) -> None:
+    """Kill the lathe among the children of a run."""
+    for child in Path(f'/proc/{run}/task/{run}/children').read_text().split():
+        if b'entry_points\0lathe\0' in Path(f'/proc/{child}/cmdline').read_bytes():
+            os.kill(int(child), signal.SIGKILL)
 
 
 def test_a_misspelt_parameter_is_refused_before_anything_starts(

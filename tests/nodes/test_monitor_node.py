@@ -233,6 +233,7 @@ def test_silence_makes_the_state_unknown_and_keeps_the_flag(
     assert {entry.key: entry.value for entry in silent.values} == {
         'state': 'unknown',
         'flag': 'True',
+        'flag since, s': value(diagnostics, 'cut', 'flag since, s'),
     }
     there.cut(0.5)
     bench.spin_until(lambda: cut_status(diagnostics).level == DiagnosticStatus.ERROR, 'chatter')

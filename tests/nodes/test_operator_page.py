@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import http.server
 import json
+import re
 import sys
 import threading
 import time
@@ -83,7 +84,10 @@ def test_a_slider_provokes_chatter_and_the_recommended_speed_cures_it(browser: B
         browser.key('PageUp', 33)  # by a tenth of the slider each
     browser.until('cell.lathe_values.depth_of_cut > 0.0006', 'the deeper cut')
     browser.until(f'{LAMP} === "CHATTER"', 'the lamp', PATIENCE)
-    assert browser.run('document.querySelector("#lamp-since").textContent').startswith('since ')
+    since = 'document.querySelector("#lamp-since").textContent'
+    dated = browser.until(since, 'since when').removeprefix('since ').removesuffix(' s')
+    told = re.findall(r'At ([\d.]+) s: chatter', browser.text('#log'))
+    assert dated in [f'{float(at):.2f}' for at in told]  # lamp and sentence tell the same
     browser.until('cell.figures.growth_rate', 'the growth rate', PATIENCE)
     browser.until('!document.querySelector("#take-recommended").disabled', 'a speed', PATIENCE)
     browser.click('#take-recommended')
@@ -99,7 +103,9 @@ def test_a_refusal_is_read_and_the_control_goes_back(browser: Browser) -> None:
     browser.enter('#p-depth_of_cut', '5000')
     refusal = 'document.querySelector(".refusal:not(:empty)")?.textContent'
     said = browser.until(refusal, 'the refusal')
-    assert said == 'depth_of_cut is 5.0 m: it must be a finite number from 0 to 0.1 m.'
+    assert said == (
+        'depth_of_cut is 5.0 m: it must be a finite number from 0 to 0.1 m. That is 0 to 100 mm.'
+    )
     shown = browser.run('Number(document.querySelector("#p-depth_of_cut").value)')
     assert shown == pytest.approx(1e3 * before)
     assert value_of(browser, 'depth_of_cut') == before

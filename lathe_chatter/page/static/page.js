@@ -133,6 +133,7 @@ function takeServer(news) {
   $('operate').textContent = server.operating ? 'Look on' : free ? 'Operate' : 'Take over';
   $('operate').setAttribute('aria-pressed', String(server.operating));
   $('operate').disabled = !server.trusted;
+  document.body.classList.toggle('looking-on', !server.operating);
   if (recorded) return;
   const who = server.operating ? 'you operate' : free ? 'nobody operates' : `${server.operator} operates`;
   $('viewers').textContent = `${server.viewers} ${server.viewers === 1 ? 'viewer' : 'viewers'}, ${who}. You are ${server.you}${server.trusted ? '' : ', without the token: you may look, and not act'}.`;
@@ -186,7 +187,9 @@ function showLamp() {
   $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
   const word = !known ? 'unknown' : flag.up ? 'CHATTER' : state ?? 'no chatter';
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
-  const since = !known ? '' : flag.since != null ? `since ${flag.since.toFixed(2)} s` : flag.up ? 'since before this page looked' : '';
+  const told = cell.statuses?.monitor?.cut?.values ?? {}, same = told.flag === (flag?.up ? 'True' : 'False');
+  const at = flag?.since ?? (same ? told['flag since, s'] : null);
+  const since = known && at != null ? `since ${Number(at).toFixed(2)} s` : '';
   if ($('lamp-since').textContent !== since) $('lamp-since').textContent = since;
 }
 
@@ -387,14 +390,16 @@ function makeControl(row) {
     control.next = value;
     if (control.busy) return;
     control.busy = true;
-    let answer = {ok: true, text: ''};
+    let answer = {ok: true, text: ''}, wanted;
     while (control.next != null) {
-      const wanted = control.next;
+      wanted = control.next;
       control.next = null;
       answer = await ask({do: 'set', node: 'lathe', values: {[row.name]: wanted}});
     }
     control.busy = false;
-    refusal.textContent = answer.ok ? '' : answer.text;
+    const outside = unit !== row.unit && (wanted < row.low || wanted > row.high);
+    const here = outside ? ` That is ${number(row.low * factor)} to ${number(row.high * factor)} ${unit}.` : '';
+    refusal.textContent = answer.ok ? '' : answer.text + here;
     if (!answer.ok && cell.lathe_values) show(cell.lathe_values[row.name], true);
   }
   const wanted = text => (row.type === 1 ? text === 'true' : listed ? text : Number(text) / factor);
