@@ -31,9 +31,10 @@ _HIGHEST = Quantity('end of a band', 'Hz', high=1e6)
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
-        'files', nargs='+', metavar='BODY=FILE', type=_body_and_file,
-        help='frequency responses of tool or workpiece where it cuts: universal files '
-        '(dataset 58) or CSV; one body may have several, of the same point',
+        'files', nargs='+', metavar='[BODY=]FILE', type=_body_and_file,
+        help='frequency responses of tool or workpiece where it cuts, of the tool where no body '
+        'is named: universal files (dataset 58) or CSV; one body may have several, of the same '
+        'point',
     )  # fmt: skip
     parser.add_argument(
         '--output', type=Path, required=True, metavar='FILE',
@@ -61,9 +62,13 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def _body_and_file(text: str) -> tuple[str, Path]:
-    body, _, file = text.partition('=')
+    body, equals, file = text.partition('=')
+    if not equals and text:
+        return 'tool', Path(text)
     if body not in _BODIES or not file:
-        raise argparse.ArgumentTypeError(f'{text!r} must be tool=FILE or workpiece=FILE')
+        raise argparse.ArgumentTypeError(
+            f'{text!r} must be a file of the tool, tool=FILE or workpiece=FILE'
+        )
     return body, Path(file)
 
 

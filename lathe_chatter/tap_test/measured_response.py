@@ -12,6 +12,7 @@ even; the modes are fitted to it with the factor that makes it of a receptance.
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import re
 from collections.abc import Iterator
@@ -36,6 +37,15 @@ _FORCES = {'n': 1.0, 'kn': 1e3, 'lbf': 4.4482216152605}
 _UFF_ORDERS = {8: 0, 11: 1, 12: 2}
 """Specific data types of dataset 58: displacement, velocity, acceleration."""
 _UFF_FORCE, _UFF_FRF, _UFF_COHERENCE = 13, 4, 6
+_UFF_FUNCTIONS = {
+    1: 'a record over time',
+    2: 'an auto spectrum',
+    3: 'a cross spectrum',
+    _UFF_COHERENCE: 'a coherence',
+    9: 'a spectral density',
+    12: 'a spectrum',
+}
+"""What else dataset 58 may hold, by its number of the function."""
 
 
 @dataclass(frozen=True)
@@ -127,11 +137,18 @@ def _universal(path: Path) -> Iterator[FrequencyResponse]:
             "Universal files need the package pyuff: pip install 'lathe_chatter[identify]'."
         ) from None
     try:
-        sets: Any = pyuff.UFF(str(path)).read_sets()
+        with contextlib.redirect_stdout(None):  # pyuff prints some sets as it reads them
+            sets: Any = pyuff.UFF(str(path)).read_sets()
     except Exception as error:  # noqa: BLE001 -- pyuff raises whatever a broken file makes it
         raise FrequencyResponseError(f'{path} is no sound universal file: {error}.') from None
     sets = [sets] if isinstance(sets, dict) else sets
     functions = [entry for entry in sets if entry.get('type') == 58]
+    if functions and not any(entry['func_type'] == _UFF_FRF for entry in functions):
+        others = {_UFF_FUNCTIONS.get(e['func_type'], 'another function') for e in functions}
+        raise FrequencyResponseError(
+            f'{path} holds no frequency response, but {" and ".join(sorted(others))}: export the '
+            'response over the force of the hammer.'
+        )
     coherences = {_points(e): e for e in functions if e['func_type'] == _UFF_COHERENCE}
     for entry in functions:
         if entry['func_type'] != _UFF_FRF:

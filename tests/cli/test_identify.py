@@ -35,7 +35,7 @@ def test_a_tap_test_becomes_a_machine_file_and_a_picture(
     tap_tests: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / 'machine.yaml'
-    given = [f'{body}={file}' for body, file in tap_tests.items()]
+    given = [str(tap_tests['tool']), f'workpiece={tap_tests["workpiece"]}']  # bare: the tool's
     assert cli.main(['identify', *given, '--output', str(output), '--json']) == 0
     told = json.loads(capsys.readouterr().out)
     assert len(told['modes']['workpiece']) == 2
@@ -83,8 +83,8 @@ def test_a_machine_file_is_not_overwritten_with_its_picture(
     assert not (tmp_path / 'x.png').exists()
 
 
-@pytest.mark.parametrize('wrong', ['spindle=a.csv', 'tool.csv', 'tool='])
-def test_a_file_needs_its_body(
+@pytest.mark.parametrize('wrong', ['spindle=a.csv', '', 'tool='])
+def test_a_file_is_of_a_body(
     wrong: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:

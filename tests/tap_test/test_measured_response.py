@@ -150,3 +150,17 @@ def test_what_only_looks_like_a_universal_file_is_a_sentence(tmp_path: Path) -> 
     file.write_text('    -1\n    58\nnothing more')
     with pytest.raises(FrequencyResponseError, match=r'a\.uff'):
         read_frequency_responses(file)
+
+
+def test_another_function_is_named_and_nothing_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A record over time, as analysers export them too; and a group, which pyuff prints."""
+    truth = tap_test(coherence=False)
+    file = write_universal(tmp_path / 'a.uff', truth, binary=False, func_type=1)
+    group = [f'{1:10d}' + 6 * f'{0:10d}' + f'{1:10d}', 'Left', f'{8:10d}{7:10d}{0:10d}{0:10d}']
+    group = ['    -1', '  2467', *group, '    -1', '']
+    file.write_text('\n'.join(group) + file.read_text())
+    with pytest.raises(FrequencyResponseError, match='response, but a record over time: export'):
+        read_frequency_responses(file)
+    assert capsys.readouterr().out == ''
