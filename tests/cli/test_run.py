@@ -233,7 +233,6 @@ def test_a_refused_step_ends_the_run_with_the_reason(
     assert 'depth_of_cut' in done.stderr
     assert '0.1 m' in done.stderr
     assert 'Traceback' not in done.stdout + done.stderr
-    assert (tmp_path / 'run' / 'report.png').is_file()
 
 
 def test_a_lathe_that_is_killed_ends_the_run_with_a_report(

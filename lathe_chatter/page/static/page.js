@@ -223,6 +223,7 @@ function showStatuses() {
   const recording = recorder?.recording;
   $('recording').textContent = recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
   showFigures();
+  showLamp();
 }
 
 function showLog() {
