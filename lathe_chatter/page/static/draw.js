@@ -32,12 +32,14 @@ function room(least) {
 }
 
 const plots = new Map();
+// Of the places of plots, as they are told: to ask for one lays out the page, forty times a second.
+const widths = new Map();
 
 // A plot in a place, with options as `make` has them, made anew where `made` is another than before;
 // `more` is kept at the plot, for what is drawn by hand.
 function plot(id, made, make, data, more = {}) {
-  const place = document.getElementById(id);
-  if (!place.clientWidth) return null;
+  const place = document.getElementById(id), width = widths.get(id) ?? place.clientWidth;
+  if (!width) return null;
   let u = plots.get(id);
   if (u?.made === made) {
     Object.assign(u, more);
@@ -48,7 +50,7 @@ function plot(id, made, make, data, more = {}) {
   const keep = {hooks: {init: [u => Object.assign(u, more, {made})]}};
   const options = make();
   keep.hooks = {...options.hooks, ...keep.hooks};
-  u = new uPlot({width: place.clientWidth, cursor: {show: false}, ...options, ...keep}, data, place);
+  u = new uPlot({width, cursor: {show: false}, ...options, ...keep}, data, place);
   u.root.setAttribute('role', 'img');
   plots.set(id, u);
   return u;
@@ -60,10 +62,9 @@ function describe(id, text) {
 
 const resizing = new ResizeObserver(entries => {
   for (const {target} of entries) {
-    const u = plots.get(target.id);
-    if (u && target.clientWidth && u.width !== target.clientWidth) {
-      u.setSize({width: target.clientWidth, height: u.height});
-    }
+    const u = plots.get(target.id), width = target.clientWidth;
+    widths.set(target.id, width);
+    if (u && width && u.width !== width) u.setSize({width, height: u.height});
   }
 });
 document.querySelectorAll('.plot').forEach(place => resizing.observe(place));
@@ -103,8 +104,10 @@ function drawSignals(id, what, times, values, height, onSelect) {
   }
 }
 
+const plain = new Intl.NumberFormat('en', {maximumFractionDigits: 9, useGrouping: false});
+
 function number(value, digits = 3) {
-  return value == null || !isFinite(value) ? '–' : Number(value.toPrecision(digits)).toLocaleString('en', {maximumFractionDigits: 9, useGrouping: false});
+  return value == null || !isFinite(value) ? '–' : plain.format(Number(value.toPrecision(digits)));
 }
 
 // Axes for what is drawn by hand over them.
