@@ -201,11 +201,13 @@ def blocks_as_written(run: Run, samples: str) -> Iterator[SampleBlocks]:
 
 
 def _timeline(run: Run, places: Integers, blocks: list[_Ends]) -> Timeline:
-    rows = _joined([each.rows for each in blocks])
+    # The two were read one after the other, and a run that is recorded has grown meanwhile.
+    count = min(len(places), sum(len(each.rows) for each in blocks))
+    places, rows = places[:count], _joined([each.rows for each in blocks])[:count]
     some = rows > 0
-    received = _joined([each.received for each in blocks])[some]
-    published = _joined([each.published for each in blocks])[some]
-    times = np.concatenate([np.zeros((0, 2)), *(each.times for each in blocks)])[some]
+    received = _joined([each.received for each in blocks])[:count][some]
+    published = _joined([each.published for each in blocks])[:count][some]
+    times = np.concatenate([np.zeros((0, 2)), *(each.times for each in blocks)])[:count][some]
     # A forward step is no disorder: it looks like a pause, and only the recorder can tell it.
     passed = np.diff(received)
     back = np.flatnonzero(passed < -_STEP_BACK)
