@@ -117,6 +117,10 @@ class OperatorPageNode(ParameterNode):
             if name.endswith('/samples') and SAMPLES_TYPE in kinds
         }
         self._board.put('lathes', sorted({name for name in found if name} | {*self._cells}))
+        # Who operates in another page this one cannot know, but that it may be so.
+        names = [name for name, _ in self.get_node_names_and_namespaces()]
+        pages = sum(name.startswith('operator_page') for name in names)
+        self._board.put('other_pages', pages - 1)
         watched = {viewer.choice for viewer in self.server.viewers}
         for name in [*self._cells]:
             if name in watched or self._cells[name].playing is not None:

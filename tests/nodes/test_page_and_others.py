@@ -107,3 +107,10 @@ def test_another_lathe_is_chosen_and_driven(browser: Browser) -> None:
     browser.until('cell.name === "/lathe" && cell.lathe_values', 'the first', PATIENCE)
     assert browser.run('cell.lathe_values.depth_of_cut') == before
     assert browser.complaints == []
+
+
+def test_another_page_is_told_of(browser: Browser, page: Page) -> None:
+    viewers = 'document.querySelector("#viewers").textContent'
+    assert 'Another operator page' not in browser.run(viewers)
+    page.nodes.start('operator_page', 'port:=0', namespace='/second')
+    browser.until(f'{viewers}.includes("Another operator page serves")', 'the other', PATIENCE)

@@ -115,6 +115,7 @@ function takePage(news) {
     else if (!news.lathes.length) showGone('No lathe is there yet. The page waits for one.');
   }
   if (recorded) takeRun(news);
+  if ('other_pages' in news) takeServer({});
   if (news.scenarios) $('scenario').replaceChildren(...news.scenarios.map(name => new Option(name)));
 }
 
@@ -135,9 +136,10 @@ function takeServer(news) {
   $('operate').setAttribute('aria-pressed', String(server.operating));
   $('operate').disabled = !server.trusted;
   document.body.classList.toggle('looking-on', !server.operating);
-  if (recorded) return;
+  if (recorded || !('viewers' in server)) return;
+  const others = page.other_pages > 0 ? ' Another operator page serves this ROS domain too: who operates there is not known here.' : '';
   const who = server.operating ? 'you operate' : free ? 'nobody operates' : `${server.operator} operates`;
-  $('viewers').textContent = `${server.viewers} ${server.viewers === 1 ? 'viewer' : 'viewers'}, ${who}. You are ${server.you}${server.trusted ? '' : ', without the token: you may look, and not act'}.`;
+  $('viewers').textContent = `${server.viewers} ${server.viewers === 1 ? 'viewer' : 'viewers'}, ${who}. You are ${server.you}${server.trusted ? '' : ', without the token: you may look, and not act'}.${others}`;
   lock();
 }
 
