@@ -11,9 +11,9 @@ import numpy as np
 from lathe_chatter.cli.common_options import add_force, add_json, in_unit
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.parameter_options import (
-    ONLY_OF_SAMPLES,
     add_parameter_options,
     config_of,
+    only_of_samples,
     say_what_is_assumed,
 )
 from lathe_chatter.cli.worker_options import add_executor, executor_of
@@ -63,11 +63,14 @@ def configure(parser: ArgumentParser) -> None:
     add_json(parser)
     add_parameter_options(
         parser,
-        without=(
-            *ONLY_OF_SAMPLES, 'spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance',
-            'speed_variation_amplitude', 'speed_variation_frequency', 'tool_leaves_cut',
-        ),
-    )  # fmt: skip
+        without={
+            **only_of_samples('a knock is followed without it'),
+            **{field: f'give --{option}' for option, field, _ in _AXES},
+            'speed_variation_amplitude': 'a knock is followed at a steady speed',
+            'speed_variation_frequency': 'a knock is followed at a steady speed',
+            'tool_leaves_cut': 'a knock is followed with a tool that leaves the cut',
+        },
+    )
 
 
 _FEW = 25

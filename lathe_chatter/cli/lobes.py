@@ -21,9 +21,9 @@ from lathe_chatter.cli.common_options import (
 )
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.parameter_options import (
-    ONLY_OF_SAMPLES,
     add_parameter_options,
     config_of,
+    only_of_samples,
     say_what_is_assumed,
 )
 from lathe_chatter.cli.worker_options import add_executor, executor_of
@@ -104,7 +104,7 @@ def configure(parser: ArgumentParser) -> None:
     add_executor(parser)
     add_force(parser)
     add_json(parser)
-    add_parameter_options(parser, without=ONLY_OF_SAMPLES)
+    add_parameter_options(parser, without=only_of_samples('no limit of a cut depends on it'))
 
 
 def run(options: Namespace) -> int:

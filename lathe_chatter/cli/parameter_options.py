@@ -3,29 +3,38 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, BooleanOptionalAction, Namespace
-from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Any
 
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model.lathe_parameter_table import LATHE
 
-ONLY_OF_SAMPLES = (
-    'unbalance', 'force_noise', 'cutting_force_noise', 'sensor_noise', 'acceleration_noise',
-    'runout', 'tool_runout', 'accelerometers', 'seed', 'sample_rate', 'spindle_acceleration',
-)  # fmt: skip
-"""Parameters that change samples, and no limit of a cut."""
+
+def only_of_samples(why: str) -> dict[str, str]:
+    """The parameters that change samples and no limit of a cut, each with why a verb has not."""
+    return {row.name: why for row in LATHE if row.only_samples}
 
 
-def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()) -> None:
-    """Declare an option for every parameter of a lathe, but for some."""
+def add_parameter_options(
+    parser: ArgumentParser, *, without: Mapping[str, str] | None = None
+) -> None:
+    """Declare an option for every parameter of a lathe, but for some.
+
+    Args:
+        parser: Of a verb.
+        without: Those that it has not, and why: a sentence about one that is given says it.
+    """
     group = parser.add_argument_group(
         'the lathe', 'in SI units (speeds in rev/min), or with a unit: "0.5 mm"'
     )
+    of_node = {row.name: 'the node lathe alone has it' for row in LATHE if row.node_only}
+    left_out = {**of_node, **(without or {})}
+    parser.set_defaults(left_out={_flag(name): why for name, why in left_out.items()})
     for row in LATHE:
-        if row.node_only or row.name in without:
+        if row.name in left_out:
             continue
-        flag = '--' + row.name.replace('_', '-')
+        flag = _flag(row.name)
         text = row.meaning.replace('%', '%%')
         if isinstance(row.default, bool):
             usual = 'yes' if row.default else 'no'
@@ -47,6 +56,10 @@ def add_parameter_options(parser: ArgumentParser, *, without: Iterable[str] = ()
                 flag, dest=row.name, type=row.parsed, metavar='X',
                 help=f'{text}{unit} (default: {row.default:g})',
             )  # fmt: skip
+
+
+def _flag(name: str) -> str:
+    return '--' + name.replace('_', '-')
 
 
 def given_parameters(options: Namespace) -> dict[str, Any]:

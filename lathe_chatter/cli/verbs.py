@@ -67,8 +67,12 @@ class Parser(ArgumentParser):
 
     def unknown(self, words: Sequence[str]) -> NoReturn:
         """Complain of words that are none of its options, and end."""
+        option, _, _ = words[0].partition('=')
+        why = (self.get_default('left_out') or {}).get(option.replace('--no-', '--'))
+        if why:
+            self.error(f'{option} is no option of this verb: {why}.')
         known = [option for action in self._actions for option in action.option_strings]
-        near = nearest_name(words[0].partition('=')[0], known)
+        near = nearest_name(option, known)
         hint = f', perhaps {near}' if near else ''
         self.error(f'unrecognized arguments: {" ".join(words)}{hint}')
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.knocks.knock_outcome import follow_knock, linear_reach
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.lathe_parameter_table import CUT_ROWS
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability import contact_at
 
@@ -159,9 +160,7 @@ def _upwards(forward: float, backward: float, largest: float, ratio: float) -> I
 
 def _check_steady(cut: Cut) -> None:
     """See that nothing but the knock disturbs the cut."""
-    for name in (
-        'force_noise', 'cutting_force_noise', 'sensor_noise', 'runout', 'unbalance',
-        'speed_variation_amplitude',
-    ):  # fmt: skip
-        if getattr(cut, name) != 0.0:
-            raise ParameterError(name, getattr(cut, name), '', '0, so that the knock is alone')
+    for row in CUT_ROWS:
+        value = getattr(cut, row.name)
+        if (row.only_samples or row.name == 'speed_variation_amplitude') and value != 0.0:
+            raise ParameterError(row.name, value, row.unit, '0, so that the knock is alone')

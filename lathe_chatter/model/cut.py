@@ -61,6 +61,7 @@ class Cut:
         'kg m',
         default=0.0,
         high=10.0,
+        only_samples=True,
     )
     force_noise: float = quantity(
         'random force on the tool, two-sided: its mean over T s has the variance force_noise^2/T, '
@@ -68,24 +69,42 @@ class Cut:
         'N/sqrt(Hz)',
         default=0.0,
         high=1e3,
+        only_samples=True,
     )
     cutting_force_noise: float = quantity(
         'random part of the cutting force, on tool and workpiece, measured like force_noise',
         'N/sqrt(Hz)',
         default=0.0,
         high=1e3,
+        only_samples=True,
     )
     sensor_noise: float = quantity(
-        'noise of the measured displacements, rms per sample', 'm', default=0.0, high=1e-3
+        'noise of the measured displacements, rms per sample',
+        'm',
+        default=0.0,
+        high=1e-3,
+        only_samples=True,
     )
     acceleration_noise: float = quantity(
-        'noise of the measured accelerations, rms per sample', 'm/s2', default=0.0, high=1e4
+        'noise of the measured accelerations, rms per sample',
+        'm/s2',
+        default=0.0,
+        high=1e4,
+        only_samples=True,
     )
     runout: float = quantity(
-        'once-per-turn amplitude at the workpiece', 'm', default=0.0, high=1e-3
+        'once-per-turn amplitude at the workpiece',
+        'm',
+        default=0.0,
+        high=1e-3,
+        only_samples=True,
     )
     tool_runout: float = quantity(
-        "once-per-turn amplitude that the tool's sensor sees", 'm', default=0.0, high=1e-3
+        "once-per-turn amplitude that the tool's sensor sees",
+        'm',
+        default=0.0,
+        high=1e-3,
+        only_samples=True,
     )
     speed_variation_amplitude: float = quantity(
         'sinusoidal speed variation, fraction of the spindle speed', default=0.0, high=0.5

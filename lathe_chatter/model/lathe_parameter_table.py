@@ -263,6 +263,7 @@ SETUP_ROWS = (
         'accelerometers',
         default=False,
         meaning='whether the samples have the accelerations of tool and workpiece too',
+        of_samples=True,
     ),
 )
 """Of the force law and the sampling."""

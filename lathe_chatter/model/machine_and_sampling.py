@@ -10,7 +10,7 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.model.machine import Machine
 from lathe_chatter.model.quantity_fields import Quantity, check_fields, quantity
 
-SEED = Quantity('seed of every random number', low=0.0, high=2.0**31 - 1.0)
+SEED = Quantity('seed of every random number', high=2.0**31 - 1.0, only_samples=True)
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,12 @@ class LatheSetup:
 
     machine: Machine = field(default_factory=Machine)
     sample_rate: float = quantity(
-        'samples per simulated second', 'Hz', default=1e4, low=10.0, high=1e6
+        'samples per simulated second',
+        'Hz',
+        default=1e4,
+        low=10.0,
+        high=1e6,
+        only_samples=True,
     )
     tool_leaves_cut: bool = True
     spindle_acceleration: float = quantity(
@@ -40,6 +45,7 @@ class LatheSetup:
         'rev/min per s',
         default=0.0,
         high=1e6,
+        only_samples=True,
     )
     seed: int = 0
     displacement_limit: float = quantity(

@@ -38,6 +38,7 @@ class Row:
         choices: The words that a text may be; None where any will do.
         run_time: Whether it may change while the node runs.
         node_only: Whether it means something to a node alone, and nothing without ROS.
+        of_samples: Whether what is no number changes samples, and no limit of a cut.
     """
 
     name: str
@@ -47,6 +48,12 @@ class Row:
     choices: type[Enum] | None = None
     run_time: bool = False
     node_only: bool = False
+    of_samples: bool = False
+
+    @property
+    def only_samples(self) -> bool:
+        """Whether it changes samples, and no limit of a cut: no chart depends on it."""
+        return self.of_samples or bool(self.limits and self.limits.only_samples)
 
     @property
     def unit(self) -> str:

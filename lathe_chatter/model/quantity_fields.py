@@ -30,6 +30,7 @@ class Quantity:
         high: Largest allowed value.
         exclusive: Whether `low` itself is refused (a mass of zero, for instance).
         or_zero: Whether 0 is allowed though it lies below `low`.
+        only_samples: Whether it changes samples, and no limit of a cut.
     """
 
     meaning: str
@@ -38,6 +39,7 @@ class Quantity:
     high: float = math.inf
     exclusive: bool = False
     or_zero: bool = False
+    only_samples: bool = False
 
     @property
     def allowed(self) -> str:
@@ -79,9 +81,10 @@ def quantity(  # noqa: PLR0913 -- one keyword for each fact about a field
     high: float = math.inf,
     exclusive: bool = False,
     or_zero: bool = False,
+    only_samples: bool = False,
 ) -> Any:
     """A dataclass field that carries its `Quantity`."""
-    limits = Quantity(meaning, unit, low, high, exclusive, or_zero)
+    limits = Quantity(meaning, unit, low, high, exclusive, or_zero, only_samples)
     if default is MISSING:
         return field(metadata={_KEY: limits})
     return field(default=default, metadata={_KEY: limits})

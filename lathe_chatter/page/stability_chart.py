@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
+from lathe_chatter.model.lathe_parameter_table import LATHE, cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.page.versioned_values import finite
 from lathe_chatter.report.stability_chart import (
@@ -22,17 +22,19 @@ from lathe_chatter.stability.probability import stability_probability
 LIMITS = ('depth_of_cut', 'open_limit', 'seated_limit', 'seating_line')
 _PROBABILITIES = (0.95, 0.5, 0.05)
 _MACHINES, _SPEEDS = 400, 120
-_MATTERS_NOT = ('spindle_speed_rpm', 'depth_of_cut', 'real_time_factor', 'seed')
-_NOISE = ('noise', 'runout', 'variation', 'unbalance')
+_OF_ITS_POINT = (
+    'spindle_speed_rpm', 'depth_of_cut', 'speed_variation_amplitude', 'speed_variation_frequency',
+)  # fmt: skip
+_MATTERS = [
+    row.name
+    for row in LATHE
+    if not row.only_samples and not row.node_only and row.name not in _OF_ITS_POINT
+]
 
 
 def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
-    """What of a lathe's parameters its chart depends on, and perhaps some that it does not."""
-    return {
-        name: value
-        for name, value in values.items()
-        if name not in _MATTERS_NOT and not any(word in name for word in _NOISE)
-    }
+    """What of a lathe's parameters its chart depends on."""
+    return {name: values[name] for name in _MATTERS if name in values}
 
 
 def stability_chart(values: Mapping[str, Any]) -> dict[str, Any]:

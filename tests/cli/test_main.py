@@ -95,6 +95,26 @@ NUMBERS = (
 )
 
 
+@pytest.mark.parametrize(
+    ('arguments', 'why'),
+    [
+        (['lobes', '--unbalance', '1'], 'no limit of a cut depends on it'),
+        (['knock-map', '--force-noise=1'], 'a knock is followed without it'),
+        (['knock-map', '--spindle-speed-rpm', '3000'], 'give --speeds'),
+        (['lobes', '--no-accelerometers'], 'no limit of a cut depends on it'),
+        (['simulate', '--output', 'x', '--tick-rate', '50'], 'the node lathe alone has it'),
+    ],
+)
+def test_a_parameter_that_a_verb_has_not_is_refused_with_the_reason(
+    arguments: list[str], why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    said = capsys.readouterr().err
+    assert f'is no option of this verb: {why}.\n' in said
+    assert 'perhaps' not in said
+
+
 @pytest.mark.parametrize('verb', VERBS)
 def test_every_number_that_a_verb_takes_has_its_unit_in_the_help(verb: str) -> None:
     entry = Parser()

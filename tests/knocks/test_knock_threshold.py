@@ -81,7 +81,9 @@ def test_an_unstable_cut_needs_no_knock_and_no_cut_takes_any() -> None:
     assert idle.margin is Margin.NONE_FOUND
 
 
-@pytest.mark.parametrize('name', ['force_noise', 'runout', 'speed_variation_amplitude'])
+@pytest.mark.parametrize(
+    'name', ['force_noise', 'runout', 'tool_runout', 'speed_variation_amplitude']
+)
 def test_a_disturbed_cut_is_refused(name: str) -> None:
     with pytest.raises(ParameterError, match=name):
         smallest_lasting_knock(MACHINE, Cut(**{name: 1e-3}))

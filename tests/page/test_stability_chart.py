@@ -1,0 +1,43 @@
+"""What the page draws its chart of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from lathe_chatter.model.lathe_parameter_table import LATHE
+from lathe_chatter.page.stability_chart import chart_key, stability_chart
+
+START = LATHE.complete({})
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'is_of_chart'),
+    [
+        ('force_noise', 0.01, False),
+        ('tool_runout', 1e-6, False),
+        ('sample_rate', 2e4, False),
+        ('tick_rate', 100.0, False),
+        ('spindle_speed_rpm', 4000.0, False),
+        ('speed_variation_amplitude', 0.1, False),
+        ('tool.mass', 0.06, True),
+        ('bearing_clearance', 1e-5, True),
+        ('workpiece_diameter', 0.1, True),
+        ('tool_leaves_cut', False, True),
+    ],
+)
+def test_the_chart_is_drawn_anew_only_where_it_depends_on_what_changed(
+    name: str, value: Any, is_of_chart: bool
+) -> None:
+    changed = {**START, name: value}
+    assert (chart_key(changed) != chart_key(START)) is is_of_chart
+
+
+def test_what_the_key_leaves_out_changes_no_chart() -> None:
+    left_out = {
+        'force_noise': 0.01, 'runout': 1e-6, 'unbalance': 1e-6, 'sample_rate': 2e4, 'seed': 3,
+        'accelerometers': True, 'spindle_acceleration': 100.0,
+    }  # fmt: skip
+    assert chart_key(LATHE.complete(left_out)) == chart_key(START)
+    assert stability_chart(LATHE.complete(left_out)) == stability_chart(START)
