@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,10 +13,21 @@ PICTURES = ('.png', '.svg', '.pdf')
 """Endings of pictures; beside a PNG there is an SVG."""
 
 
+def path_of(text: str) -> Path:
+    """What names a file or a folder.
+
+    Raises:
+        ArgumentTypeError: If it cannot: an empty text would mean the folder where one is.
+    """
+    if not text or '\0' in text:
+        raise ArgumentTypeError(f'{text!r} must name a file or a folder')
+    return Path(text)
+
+
 def add_run(parser: ArgumentParser) -> None:
     """Declare the recorded run that a verb reads."""
     parser.add_argument(
-        'run_path', type=Path, metavar='RUN', help='folder or file of a recorded run'
+        'run_path', type=path_of, metavar='RUN', help='folder or file of a recorded run'
     )
 
 

@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import NamedTuple
 
-from lathe_chatter.cli.common_options import add_json, utf8
+from lathe_chatter.cli.common_options import add_json, path_of, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.dataset import Plan, load_plan, make_dataset
@@ -21,9 +21,9 @@ EXAMPLE = 'lathe-chatter dataset examples/datasets/chatter.yaml --output data/ch
 
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument('plan', type=Path, metavar='PLAN.yaml', help='what the data set is')
+    parser.add_argument('plan', type=path_of, metavar='PLAN.yaml', help='what the data set is')
     parser.add_argument(
-        '--output', type=Path, metavar='DIR',
+        '--output', type=path_of, metavar='DIR',
         help='folder to make; one that was interrupted is continued (default: the name of the '
         'plan)',
     )  # fmt: skip

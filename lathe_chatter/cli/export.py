@@ -6,7 +6,7 @@ import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import PICTURES, add_json, add_run, utf8
+from lathe_chatter.cli.common_options import PICTURES, add_json, add_run, path_of, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.recording import read_run
@@ -48,7 +48,10 @@ def configure(parser: ArgumentParser) -> None:
         'simulated time: for viewers that do not unroll blocks of samples',
     )
     parser.add_argument(
-        '--output', type=Path, metavar='PATH', help='file, or folder of an unrolled run, to make'
+        '--output',
+        type=path_of,
+        metavar='PATH',
+        help='file, or folder of an unrolled run, to make',
     )
     parser.add_argument('--topic', help='of the samples, where the run has several lathes')
     parser.add_argument(

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.cli.common_options import PICTURES, add_force, add_json, in_unit
+from lathe_chatter.cli.common_options import PICTURES, add_force, add_json, in_unit, path_of
 from lathe_chatter.cli.console import Screen, keep_existing, writing
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Machine, Mode
@@ -37,7 +37,7 @@ def configure(parser: ArgumentParser) -> None:
         'point',
     )  # fmt: skip
     parser.add_argument(
-        '--output', type=Path, required=True, metavar='FILE',
+        '--output', type=path_of, required=True, metavar='FILE',
         help='machine file to write; the picture of the fit is written beside it',
     )  # fmt: skip
     parser.add_argument(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.cli.common_options import add_force, add_json, in_unit
+from lathe_chatter.cli.common_options import add_force, add_json, in_unit, path_of
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
 from lathe_chatter.cli.parameter_options import (
     add_parameter_options,
@@ -42,7 +42,7 @@ def configure(parser: ArgumentParser) -> None:
             help=f'N values from A to B, or one, {unit} (default: that of the cut)',
         )  # fmt: skip
     parser.add_argument(
-        '--output', type=Path, default=Path('knocks.jsonl'), metavar='FILE',
+        '--output', type=path_of, default=Path('knocks.jsonl'), metavar='FILE',
         help='file to keep the points in, with a PNG and an SVG beside it; one that was '
         'interrupted is continued (default: %(default)s)',
     )  # fmt: skip

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, Namespace
 from dataclasses import asdict
-from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_force, add_json, in_unit, picture_file
+from lathe_chatter.cli.common_options import add_force, add_json, in_unit, path_of, picture_file
 from lathe_chatter.cli.console import Screen, counted, keep_existing, writing
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.filter_design import UNKNOWN_MACHINE
@@ -29,7 +28,7 @@ _SPEED = Quantity('a spindle speed', 'rev/min', low=60.0, high=30_000.0, or_zero
 
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument('recording', type=Path, metavar='FILE', help='the recording')
+    parser.add_argument('recording', type=path_of, metavar='FILE', help='the recording')
     parser.add_argument(
         '--columns', metavar='NAMES',
         help='what its columns or channels are, with commas: time, spindle_angle (rev) or '
@@ -54,10 +53,10 @@ def configure(parser: ArgumentParser) -> None:
         help='nominal spindle speed, where no column is an angle or a pulse a turn',
     )  # fmt: skip
     parser.add_argument(
-        '--labels', type=Path, metavar='CSV',
+        '--labels', type=path_of, metavar='CSV',
         help='rows of start, end (s) and state: scores the flag against those that say chatter',
     )  # fmt: skip
-    parser.add_argument('--output', type=Path, metavar='FILE', help='picture to write')
+    parser.add_argument('--output', type=path_of, metavar='FILE', help='picture to write')
     add_force(parser)
     add_json(parser)
 

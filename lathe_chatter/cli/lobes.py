@@ -17,6 +17,7 @@ from lathe_chatter.cli.common_options import (
     add_force,
     add_json,
     in_unit,
+    path_of,
     picture_file,
 )
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, writing
@@ -92,12 +93,12 @@ def configure(parser: ArgumentParser) -> None:
         'of the literature has it (default: %(default)s)',
     )  # fmt: skip
     parser.add_argument(
-        '--output', type=Path, default=Path('lobes.png'), metavar='FILE',
+        '--output', type=path_of, default=Path('lobes.png'), metavar='FILE',
         help='picture to write: .png with an .svg beside it, .svg or .pdf (default: %(default)s)',
     )  # fmt: skip
     parser.add_argument(
         '--csv',
-        type=Path,
+        type=path_of,
         metavar='FILE',
         help='write the limits as CSV too, and with --map its points beside them as FILE-map.csv',
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, add_run, utf8
+from lathe_chatter.cli.common_options import add_json, add_run, path_of, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.recording import recover
 
@@ -16,7 +16,7 @@ def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     add_run(parser)
     parser.add_argument(
-        '--output', type=Path, metavar='DIR', help='folder to make (default: RUN-recovered)'
+        '--output', type=path_of, metavar='DIR', help='folder to make (default: RUN-recovered)'
     )
     add_json(parser)
 

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from lathe_chatter.cli.common_options import add_force, add_json
+from lathe_chatter.cli.common_options import add_force, add_json, path_of
 from lathe_chatter.cli.console import INTERRUPTED, Screen, keep_existing, plain, writing
 from lathe_chatter.errors import OutputError
 from lathe_chatter.executors import Processes
@@ -30,7 +30,7 @@ _FINDING_STEPS = 3
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
-        '--output', type=Path, default=Path('reproduction'), metavar='DIR',
+        '--output', type=path_of, default=Path('reproduction'), metavar='DIR',
         help='folder for the page and its pictures (default: %(default)s)',
     )  # fmt: skip
     parser.add_argument(

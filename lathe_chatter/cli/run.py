@@ -10,7 +10,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, utf8
+from lathe_chatter.cli.common_options import add_json, path_of, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
@@ -49,7 +49,7 @@ def configure(parser: ArgumentParser) -> None:
         help=f'{scenario_help()} (default: %(default)s)',
     )
     parser.add_argument(
-        '--output', type=Path, metavar='DIR', help='folder to make (default: runs/<date-time>)'
+        '--output', type=path_of, metavar='DIR', help='folder to make (default: runs/<date-time>)'
     )
     parser.add_argument(
         '--machine', metavar='FILE',

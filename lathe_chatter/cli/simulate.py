@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
-from pathlib import Path
 
-from lathe_chatter.cli.common_options import add_json, in_unit, utf8
+from lathe_chatter.cli.common_options import add_json, in_unit, path_of, utf8
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
@@ -37,7 +36,7 @@ _USUAL_DURATION = 10.0
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
-        '--output', type=Path, required=True, metavar='DIR', help='folder of the run, to make'
+        '--output', type=path_of, required=True, metavar='DIR', help='folder of the run, to make'
     )
     parser.add_argument(
         '--duration', type=in_unit('s'), metavar='S',

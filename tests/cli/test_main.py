@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from lathe_chatter.cli.common_options import path_of
 from lathe_chatter.cli.main import main
 from lathe_chatter.cli.verbs import VERBS, Parser, parser
 
@@ -140,6 +141,23 @@ def test_help_fits_a_narrow_terminal_without_colour(
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='a path is bytes on Linux')
+@pytest.mark.parametrize('verb', VERBS)
+@pytest.mark.parametrize('nothing', ['', 'a\0b'])
+def test_what_names_no_file_is_refused(
+    verb: str, nothing: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As `--output "$FOLDER"` of a script in which FOLDER is not set."""
+    of_verb = next(a for a in parser([verb])._actions if isinstance(a.choices, dict))
+    takes = [a for a in of_verb.choices[verb]._actions if a.type is path_of]
+    for action in takes:
+        with pytest.raises(SystemExit) as ended:
+            main([verb, *action.option_strings[:1], nothing])
+        assert ended.value.code == 2
+        assert f'{nothing!r} must name a file or a folder\n' in capsys.readouterr().err
+    if not takes:
+        pytest.skip('it takes no file')
+
+
 def test_a_path_in_another_encoding_works_or_is_a_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
