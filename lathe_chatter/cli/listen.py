@@ -70,6 +70,8 @@ def run(options: Namespace) -> int:
     rate = None if options.rate is None else _RATE.check('--rate', options.rate)
     labels = [] if options.labels is None else read_labels(options.labels)
     signals = read_signals(options.recording, columns=columns, rate=rate)
+    if signals.remark:
+        screen.say(signals.remark)
     sensors = sensors_among(signals.columns)
     if sensors is None:
         raise SignalFileError(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
-import struct
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +26,13 @@ class Signals:
         columns: Labels, `time` the first of them.
         samples: In the units of `samples.columns.UNITS`, sound in any (n, columns).
         source: The file, for people.
+        remark: What is wrong with it though it could be read, a sentence; else empty.
     """
 
     columns: tuple[str, ...]
     samples: Array = field(repr=False)
     source: str = ''
+    remark: str = ''
 
     @property
     def rate(self) -> float:
@@ -62,13 +64,18 @@ def read_signals(
         )
     try:
         path.stat()  # SciPy says nothing of a file that is not there
-        signals = reader(path)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter('always')
+            signals = reader(path)
     except LatheChatterError:
         raise
-    except (OSError, ValueError, csv.Error, struct.error) as error:
-        reason = reason_of(error).rstrip('.')
+    except Exception as error:  # noqa: BLE001 -- a library raises whatever a broken file makes it
+        reason = (reason_of(error) or type(error).__name__).rstrip('.')
         raise SignalFileError(f'{path} cannot be read: {reason}.') from None
-    return _labelled(path, signals, columns, rate)
+    found = _labelled(path, signals, columns, rate)
+    if any('EOF' in str(each.message) for each in told):
+        return replace(found, remark=f'{path} ends before its head says that it does.')
+    return found
 
 
 def _labelled(
@@ -96,6 +103,8 @@ def _labelled(
         signals = {_TIME: np.arange(count) / rate, **signals}
     ordered = [_TIME, *(name for name in signals if name != _TIME)]
     samples = np.column_stack([np.asarray(signals[name], np.float64) for name in ordered])
+    if not np.isfinite(samples[:, 0]).all():
+        raise SignalFileError(f'{path} has times that are no finite numbers.')
     return Signals(tuple(ordered), samples, str(path))
 
 
