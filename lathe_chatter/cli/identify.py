@@ -104,13 +104,7 @@ def run(options: Namespace) -> int:
                 )
     described = _described(base, fits)
     unknown = _unknown(fits, base, given=options.machine is not None)
-    said = ''
-    if unknown:
-        names = ', '.join(_UNKNOWN[name] for name in unknown)
-        said = (
-            f'Not measured, and so not in the file: {names}. '
-            'Without them the values of the paper are taken.'
-        )
+    said = _said_of(unknown) if unknown else ''
     with writing(output):
         described.save(output, lacking=unknown, comment=said)
     from lathe_chatter.report.modal_fit import draw_fits
@@ -146,6 +140,18 @@ def _unknown(fits: dict[str, ModalFit], base: MachineDescription, *, given: bool
         return [name for name in _UNKNOWN if name not in fits]
     lacking = [name for name in base.assumed if name not in fits]
     return ['material' if name == 'cutting_coefficient' else name for name in lacking]
+
+
+def _said_of(unknown: Sequence[str]) -> str:
+    """What the file lacks, and what a machine without that is: see `load_machine`."""
+    taken = []
+    if 'bearing' in unknown and 'workpiece' not in unknown:
+        taken.append('no bearing clearance')
+    if 'spindle' in unknown:
+        taken.append('any speed')
+    taken.append('else what the paper has' if taken else 'what the paper has')
+    names = ', '.join(_UNKNOWN[name] for name in unknown)
+    return f'Not measured, and so not in the file: {names}. Without: {", ".join(taken)}.'
 
 
 _FIGURES = ('frequency', 'damping_ratio', 'stiffness')

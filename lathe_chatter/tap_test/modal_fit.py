@@ -31,6 +31,8 @@ MOST_MODES = 8
 _EXPLAINED = 0.05
 """Of what the modes leave, the part that no pole of mere noise explains."""
 _MOST_CALLS = 200
+_FAR = 40.0
+"""The logarithm of what no mode has: a search that gets there has lost its way."""
 _ROUNDS = 3
 """Of fitting and weighing in turn; the weights settle in two or three."""
 
@@ -109,6 +111,8 @@ def fit_modes(
         if found is None:
             break
         parameters = fit.refine([*poles, found])
+        if np.abs(parameters[:-2]).max() > _FAR:
+            break
         poles = fit.poles_of(parameters)
         score = fit.information(parameters)
         if modes is None and best is not None and score > best[0] - 10.0:
@@ -129,12 +133,12 @@ class _Fit:
         self.responses = responses
         self.omega = [2.0 * np.pi * r.frequency for r in responses]
         self.factor = [r.of_receptance for r in responses]
-        self.deviations = [self._first_deviations(r) for r in responses]
+        self.deviations = [self.roughness(r) for r in responses]
         ends = [(w[0], w[-1]) for w in self.omega]
         self.lowest, self.highest = min(e[0] for e in ends), max(e[1] for e in ends)
 
     @staticmethod
-    def _first_deviations(response: FrequencyResponse) -> Array:
+    def roughness(response: FrequencyResponse) -> Array:
         """Noise by the roughness of the curve: its second differences, smoothed nowhere."""
         rough = np.abs(np.diff(response.response, 2)) / math.sqrt(6.0)
         floor = float(np.median(rough)) / math.sqrt(math.log(2.0)) / math.sqrt(2.0)
@@ -175,7 +179,7 @@ class _Fit:
     def poles_of(parameters: Array) -> list[tuple[float, float]]:
         """omega and zeta of each mode."""
         n = (parameters.size - 2) // 3
-        inside = np.clip(parameters, -40.0, 40.0)  # a search that has lost its way stays finite
+        inside = np.clip(parameters, -_FAR, _FAR)  # a search that has lost its way stays finite
         return [(math.exp(inside[3 * k]), math.exp(inside[3 * k + 1])) for k in range(n)]
 
     @staticmethod
@@ -295,7 +299,11 @@ class _Fit:
             self.responses,
             tuple(self.model(parameters)),
             tuple(self.deviations),
-            tuple(_warnings(found, self.responses) + _against(self, parameters, candidates)),
+            (
+                *_warnings(found, self.responses),
+                *_unexplained(self, parameters),
+                *_against(self, parameters, candidates),
+            ),
         )
 
 
@@ -331,6 +339,22 @@ def _against(fit: _Fit, parameters: Array, candidates: list[tuple[float, float]]
         return []
     where = f'What vibrates at {found[0] / 2.0 / math.pi:.1f} Hz moves against the force'
     return [f'{where}: it was not measured where that acts, or has its sign reversed.']
+
+
+def _unexplained(fit: _Fit, parameters: Array) -> list[str]:
+    """Which responses the modes do not explain, beyond their roughness."""
+    said = []
+    for response, model in zip(fit.responses, fit.model(parameters), strict=True):
+        noise = 2.0 * float(np.sum(fit.roughness(response) ** 2))
+        left = float(np.sum(np.abs(model - response.response) ** 2)) - noise
+        share = left / float(np.sum(np.abs(response.response) ** 2))
+        if share > _EXPLAINED:
+            left_out = (
+                f'{response.source}: the modes leave {min(share, 1.0):.0%} of it unexplained.'
+            )
+            hint = ' It may be of another point than the others.'
+            said.append(left_out + hint if len(fit.responses) > 1 else left_out)
+    return said
 
 
 def _warnings(modes: Sequence[FittedMode], responses: Sequence[FrequencyResponse]) -> list[str]:

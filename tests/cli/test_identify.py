@@ -9,6 +9,7 @@ import yaml
 from support.tap_tests import tap_test
 
 from lathe_chatter.cli import main as cli
+from lathe_chatter.model.cut import BearingContact
 from lathe_chatter.model.machine_file import load_machine
 
 pytest.importorskip('sdypy.EMA', reason='the extra `identify` is not installed')
@@ -67,11 +68,17 @@ def test_what_was_not_measured_is_said_and_left_out(
     ):
         assert name in said.partition('WARNING  Not measured')[2]
         assert name in output.read_text().splitlines()[0]
+    assert said.splitlines()[-3].endswith('Without: any speed, else what the paper has.')
     assert set(yaml.safe_load(output.read_text())) == {'tool'}
     assert load_machine(output).assumed == ('workpiece', 'cutting_coefficient')
     assert cli.main([*call, '--machine', 'chucked_shaft', '--force']) == 0
     assert 'Not measured' not in capsys.readouterr().out
     assert load_machine(output).machine.cutting_coefficient > 1e8
+    both = ['identify', *(f'{body}={file}' for body, file in tap_tests.items())]
+    assert cli.main([*both, '--output', str(output), '--force']) == 0
+    said = capsys.readouterr().out
+    assert 'Without: no bearing clearance, any speed, else what the paper has.' in said
+    assert load_machine(output).cut.bearing_contact is BearingContact.NONE
 
 
 def test_a_machine_file_is_not_overwritten_with_its_picture(

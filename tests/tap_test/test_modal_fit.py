@@ -65,6 +65,21 @@ def test_what_was_not_measured_where_the_force_acts_is_warned_of() -> None:
     assert any('310' in said and 'against the force' in said for said in fit.warnings)
 
 
+def test_a_response_of_another_point_is_warned_of() -> None:
+    first = tap_test(((300.0, 0.03, 1e7),), floor=0.01, seed=1)
+    other = tap_test(((120.0, 0.03, 1e7),), floor=0.01, seed=2)
+    fit = fit_modes([first, other])
+    assert [mode.frequency for mode in fit.modes] == [pytest.approx(300.0, rel=1e-3)]
+    assert any('another point' in said for said in fit.warnings)
+    same = tap_test(((300.0, 0.03, 1e7),), floor=0.01, seed=3)
+    assert fit_modes([first, same]).warnings == ()
+
+
+def test_modes_that_are_too_few_are_warned_of() -> None:
+    too_few = fit_modes([tap_test(floor=0.01)], modes=1).warnings
+    assert any('unexplained' in said and 'point' not in said for said in too_few)
+
+
 def test_modes_closer_than_they_are_wide_are_warned_of() -> None:
     close = ((300.0, 0.03, 1e7), (309.0, 0.03, 1.2e7))
     fit = fit_modes([tap_test(close, floor=1e-4)], modes=2)
