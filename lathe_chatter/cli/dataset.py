@@ -40,6 +40,8 @@ def run(options: Namespace) -> int:
     plan = load_plan(options.plan)
     folder = utf8('--output', options.output or Path(options.plan.stem))
     screen = Screen(json=options.json)
+    for doubt in plan.doubts:
+        screen.say(f'WARNING  {doubt}')
     screen.compile()
     if options.workers is None and options.cluster is None:
         options.workers = cores()

@@ -8,6 +8,7 @@ from dataclasses import asdict
 
 from lathe_chatter.cli.common_options import add_force, add_json, in_unit, path_of, picture_file
 from lathe_chatter.cli.console import Screen, counted, keep_existing, writing
+from lathe_chatter.cli.parameter_options import say_what_is_assumed
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.filter_design import UNKNOWN_MACHINE
 from lathe_chatter.detection.sensors_to_displacement import sensors_among
@@ -86,6 +87,7 @@ def run(options: Namespace) -> int:
         highest_frequency=_FREQUENCY.check('--highest-frequency', options.highest_frequency),
         nominal_rpm=_SPEED.check('--spindle-speed-rpm', options.spindle_speed_rpm),
     )
+    say_what_is_assumed(described, screen)
     screen.compile()
     with screen.progress('listening', len(signals.samples) / signals.rate, 's') as bar:
         judged = judge(signals, detector, bar.advance)

@@ -114,6 +114,9 @@ def run(options: Namespace) -> int:
     low, high = _speed_range(options, config)
     if not low < high:
         raise ParameterError('--to', high, 'rev/min', f'above --from, {low:g} rev/min')
+    if options.uncertain is not None and _is_mapped(options, config):
+        allowed = 'left out where growth rates colour the chart: it has one colour'
+        raise ParameterError('--uncertain', options.uncertain, '', allowed)
     files = files_of_picture(picture_file(options.output))
     keep_existing(*files, *_tables(options, config), force=options.force)
     limits = chart_limits(
@@ -143,7 +146,7 @@ def run(options: Namespace) -> int:
     if growth is not None or probability is not None:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
-    say_what_is_assumed(config, screen)
+    say_what_is_assumed(config.described, screen, config.machine)
     figures = _figures(config, limits, growth)
     if probability is not None and known:
         of_cut = stability_probability(
@@ -227,7 +230,7 @@ def _uncertainty(options: Namespace, config: LatheConfig) -> Uncertainty | None:
     """Of the machine, None where nothing is said of any."""
     known = config.described.uncertainty if config.described else None
     if options.uncertain is not None:
-        return uncertainty_from(options.uncertain, config.machine, known)
+        return uncertainty_from(options.uncertain, config.machine, known, given_as='--uncertain')
     return known
 
 

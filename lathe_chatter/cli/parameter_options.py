@@ -8,7 +8,9 @@ from typing import Any
 
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.lathe.config import LatheConfig, config_from
+from lathe_chatter.model import Machine
 from lathe_chatter.model.lathe_parameter_table import LATHE
+from lathe_chatter.model.machine_file import MachineDescription
 
 
 def only_of_samples(why: str) -> dict[str, str]:
@@ -72,9 +74,17 @@ def given_parameters(options: Namespace) -> dict[str, Any]:
     return {row.name: row.check(value) for row, value in values.items() if value is not None}
 
 
-def say_what_is_assumed(config: LatheConfig, screen: Screen) -> None:
-    """Warn of a machine file that lacks what the paper's machine stands in for."""
-    if config.described and (said := config.described.assumption(config.machine)):
+def say_what_is_assumed(
+    described: MachineDescription | None, screen: Screen, machine: Machine | None = None
+) -> None:
+    """Warn of a machine file that lacks what the paper's machine stands in for.
+
+    Args:
+        described: The file, if there is one.
+        screen: Where it is said.
+        machine: That is taken, see `MachineDescription.assumption`.
+    """
+    if described and (said := described.assumption(machine)):
         screen.say(f'WARNING  {said}')
 
 

@@ -67,6 +67,7 @@ class Plan:
     form: Form
     machine: dict[str, Distribution]  # drawn for each machine, by parameter
     files: dict[str, str]  # the machine files that are named, as text
+    doubts: tuple[str, ...] = field(repr=False)  # what those files lack, in sentences
     errors: str  # of the machine, as `uncertainty_from` takes them, or `OF_FILE`
     cut: dict[str, Distribution]  # drawn for each run, by parameter
     columns: tuple[str, ...]
@@ -117,7 +118,7 @@ def load_plan(path: Path) -> Plan:
 
 def _plan(top: Section, path: Path, text: str) -> Plan:
     values = values_of(top, [*_TOP, Row('form', 'parquet', '', choices=Form)], *_INNER)
-    machine, files, errors = _machine(top.inner('machine'), path)
+    machine, files, errors, doubts = _machine(top.inner('machine'), path)
     sensors, windows = top.inner('sensors'), top.inner('windows')
     rate = values_of(sensors, [LATHE['sample_rate']], 'columns')['sample_rate']
     samples = round(values['duration'] * rate)
@@ -129,6 +130,7 @@ def _plan(top: Section, path: Path, text: str) -> Plan:
         **{**values, 'title': values['title'] or path.stem, 'form': Form(values['form'])},
         machine=machine,
         files=files,
+        doubts=doubts,
         errors=errors,
         cut=distributions(top.inner('cut'), CUT),
         columns=_columns(sensors),
@@ -142,8 +144,10 @@ def _plan(top: Section, path: Path, text: str) -> Plan:
     )
 
 
-def _machine(section: Section, path: Path) -> tuple[dict[str, Distribution], dict[str, str], str]:
-    """How machines are drawn, the files that are named, and the errors."""
+def _machine(
+    section: Section, path: Path
+) -> tuple[dict[str, Distribution], dict[str, str], str, tuple[str, ...]]:
+    """How machines are drawn, the files that are named, the errors, and what files lack."""
     errors = values_of(section, [Row('errors', '', '')], *_MACHINE)['errors']
     section.nodes.pop('errors', None)
     drawn, described = distributions(section, _MACHINE), {'': MachineDescription()}
@@ -152,13 +156,15 @@ def _machine(section: Section, path: Path) -> tuple[dict[str, Distribution], dic
         described = {s: load_machine(p if p.is_file() else s) for s, p in places.items()}
     firsts = {name: how.values[0] for name, how in drawn.items() if name != MACHINE_FILE.name}
     files = {source: one.text() for source, one in described.items() if source}
+    doubts: list[str] = []
     for source, one in described.items():
-        config_from({**firsts, MACHINE_FILE.name: files.get(source, '')})  # or says what is wrong
+        config = config_from({**firsts, MACHINE_FILE.name: files.get(source, '')})
+        doubts += filter(None, [one.assumption(config.machine)])
         if errors == OF_FILE and not one.uncertainty:
             raise section.refused(f'errors is file: {source or "no file that"} has none')
         if errors not in {'', OF_FILE}:
             uncertainty_from(errors, one.machine)
-    return drawn, files, errors
+    return drawn, files, errors, tuple(doubts)
 
 
 def _columns(section: Section) -> tuple[str, ...]:

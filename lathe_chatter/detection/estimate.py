@@ -35,7 +35,7 @@ class Mode(str, Enum):
     NO_SPINDLE = 'the spindle is not seen'
     NOMINAL = 'a spindle speed that is only nominal, and so without a machine'
     BLIND = 'no sensor that can be believed'
-    TOO_SLOW = 'a sample rate that is too low for the frequencies of the machine'
+    TOO_SLOW = 'a sample rate that is too low for the frequencies that are looked for'
     WAITING = 'no samples yet'
 
     @classmethod

@@ -159,7 +159,7 @@ class Score:
         seconds: That are labelled.
         events: Stretches of chatter.
         found: Of them that were flagged.
-        delay: From the beginning of such a stretch to its flag, median, s.
+        delay: From the beginning of such a stretch to its flag, 0 where that was up, median, s.
         false_alarms: Flags that rose outside of chatter.
         quiet_hours: Labelled hours without chatter, against which they count.
     """
@@ -192,7 +192,8 @@ def score_of(times: Array, flagged: NDArray[np.bool_], labels: Sequence[Label]) 
             chatter |= inside
             raised = times[inside & flagged]
             if len(raised):
-                delays.append(float(raised[0]) - label.start)
+                up = flagged[: np.searchsorted(times, raised[0], 'left')][-1:].any()
+                delays.append(0.0 if up else float(raised[0]) - label.start)
     rises = np.flatnonzero(flagged & ~np.r_[False, flagged[:-1]])
     near = [any(label.start <= times[k] <= label.end + _LATE for label in events) for k in rises]
     steps = np.diff(times)

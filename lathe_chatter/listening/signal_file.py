@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +17,8 @@ from lathe_chatter.errors import LatheChatterError, SignalFileError, optional, r
 from lathe_chatter.recording import read_run
 
 _TIME = 'time'
+_OWN_TIMES = 1e-3
+"""By how much times may differ from a rate that is given with them, relative."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +53,10 @@ def read_signals(
             or a recorded run.
         columns: What its columns or channels are, in order; by default what they are called,
             and `sound` for the first channel of a WAV.
-        rate: Samples a second, Hz, where it has no column `time`.
+        rate: Samples a second, Hz, where it has no times.
 
     Raises:
-        SignalFileError: If it cannot be read, or has no time; the sentence says why.
+        SignalFileError: If it cannot be read, has no times, or others; the sentence says why.
     """
     path = Path(path)
     readers = {'.wav': _wav, '.csv': _csv, '.mat': _mat, '.parquet': _parquet}
@@ -105,7 +108,13 @@ def _labelled(
     samples = np.column_stack([np.asarray(signals[name], np.float64) for name in ordered])
     if not np.isfinite(samples[:, 0]).all():
         raise SignalFileError(f'{path} has times that are no finite numbers.')
-    return Signals(tuple(ordered), samples, str(path))
+    found = Signals(tuple(ordered), samples, str(path))
+    if rate is not None and not math.isclose(found.rate, rate, rel_tol=_OWN_TIMES):
+        raise SignalFileError(
+            f'{path} has times of its own, {found.rate:g} samples a second: a rate of {rate:g} Hz '
+            'is for recordings without.'
+        )
+    return found
 
 
 def _wav(path: Path) -> dict[str, Array]:

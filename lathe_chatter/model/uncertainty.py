@@ -167,13 +167,16 @@ _QUANTITIES = {
 """The names that errors are given by: places in `MODAL`; None is C."""
 
 
-def uncertainty_from(text: str, machine: Machine, known: Uncertainty | None = None) -> Uncertainty:
+def uncertainty_from(
+    text: str, machine: Machine, known: Uncertainty | None = None, *, given_as: str = 'errors'
+) -> Uncertainty:
     """Relative standard errors as `frequency=2%,damping=20%,stiffness=5%,C=15%`, for all modes.
 
     Args:
         text: As above.
         machine: Whose modes they are.
         known: What else is uncertain; what the text names is as it says.
+        given_as: What the user calls the text.
 
     Raises:
         ParameterError: If a name is unknown, or an error no share from 0 to 10.
@@ -181,14 +184,14 @@ def uncertainty_from(text: str, machine: Machine, known: Uncertainty | None = No
     known = known or Uncertainty()
     for entry in filter(None, (part.strip() for part in text.split(','))):
         name, _, value = (part.strip() for part in entry.partition('='))
+        if name not in _QUANTITIES:
+            raise ParameterError(given_as, name, '', 'of frequency, damping, stiffness and C')
         try:
             error = float(value.removesuffix('%')) * (0.01 if value.endswith('%') else 1.0)
         except ValueError:
             error = -1.0
         if not 0.0 <= error <= 10.0:
-            raise ParameterError(f'--uncertain {name}', value, '', 'a share such as 2% or 0.02')
-        if name not in _QUANTITIES:
-            raise ParameterError('--uncertain', name, '', 'of frequency, damping, stiffness and C')
+            raise ParameterError(f'{given_as} {name}', value, '', 'a share such as 2% or 0.02')
         known = _with_error_everywhere(known, machine, _QUANTITIES[name], error)
     return known
 

@@ -340,4 +340,6 @@ def test_the_csv_has_what_the_picture_shows(
         seated=bool(points['seated'][k]),
     )  # fmt: skip
     assert points['growth_rate'][k] == pytest.approx(root.real, abs=1e-6)
+    assert cli.main([*call, '--map']) == 2
+    assert '--uncertain' in capsys.readouterr().err
     assert cli.main(['lobes', '--csv', str(tmp_path / 'm.csv'), *place[:2], '--map']) == 2

@@ -32,6 +32,16 @@ def test_the_example_is_what_it_says() -> None:
     assert plan.machine['cutting_coefficient'].values == (2e6, 6e6)
 
 
+def test_what_a_machine_file_lacks_is_known_unless_the_plan_has_it(tmp_path: Path) -> None:
+    mode = '{modes: [{frequency: 200 Hz, damping_ratio: 2 %, mass: 5 kg}]}'
+    (tmp_path / 'mine.yaml').write_text(f'tool: {mode}\nworkpiece: rigid\n')
+    (doubt,) = load_plan(written(tmp_path, 'machine: {machine: mine.yaml}')).doubts
+    assert 'mine lacks a cutting coefficient' in doubt
+    beside = 'machine: {machine: mine.yaml, cutting_coefficient: {uniform: [1e9, 2e9]}}'
+    assert load_plan(written(tmp_path, beside)).doubts == ()
+    assert load_plan(EXAMPLE).doubts == ()
+
+
 @pytest.mark.parametrize(
     ('text', 'words'),
     [

@@ -16,7 +16,7 @@ from lathe_chatter.detection import Estimate
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.listening import Judged, Signals, read_signals, score
-from lathe_chatter.listening.detector_score import Label, read_labels
+from lathe_chatter.listening.detector_score import Label, read_labels, score_of
 from lathe_chatter.listening.picture import draw_judged
 from lathe_chatter.model import Cut
 
@@ -86,6 +86,29 @@ def test_a_score_counts_what_it_says() -> None:
     assert (found.events, found.found, found.false_alarms) == (1, 1, 1)
     assert found.delay == pytest.approx(0.6)
     assert found.quiet_hours == pytest.approx(6 / 3600)
+
+
+def test_a_flag_that_was_up_before_the_chatter_has_no_delay() -> None:
+    times = np.arange(1, 81) / 10
+    found = score_of(times, (times > 3.8) & (times <= 6), [Label(4, 6, 'chatter')])
+    assert (found.found, found.delay) == (1, 0.0)
+
+
+def test_a_rate_beside_other_times_is_refused(sound: Any, tmp_path: Path) -> None:
+    (path,) = written(tmp_path, 'wav', sound)
+    assert read_signals(path, rate=1e4).rate == pytest.approx(1e4)
+    with pytest.raises(SignalFileError, match='10000 samples a second: a rate of 44100 Hz'):
+        read_signals(path, rate=44_100.0)
+
+
+def test_a_machine_file_that_lacks_a_body_is_warned_of(
+    sound: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine = tmp_path / 'mine.yaml'
+    machine.write_text('tool: {modes: [{frequency: 200 Hz, damping_ratio: 2 %, mass: 5 kg}]}')
+    (path,) = written(tmp_path, 'wav', sound[:20_000])
+    assert main(['listen', path, '--machine', str(machine)]) == 0
+    assert 'WARNING  The machine file mine lacks a workpiece' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -254,8 +254,12 @@ def test_uncertainty_in_short() -> None:
     assert both.error_of('cutting_coefficient') == pytest.approx(0.03)
     assert both.error_of('tool.modes[0].stiffness') == pytest.approx(math.hypot(0.05, 0.02))
     for wrong in ('speed=2%', 'frequency=two', 'frequency=-1%'):
-        with pytest.raises(ParameterError, match='--uncertain'):
+        with pytest.raises(ParameterError, match=r'^errors .*is '):
             uncertainty_from(wrong, Machine())
+        with pytest.raises(ParameterError, match=r'^--uncertain '):
+            uncertainty_from(wrong, Machine(), given_as='--uncertain')
+    with pytest.raises(ParameterError, match="'nix': it must be of frequency"):
+        uncertainty_from('nix', Machine())
 
 
 TOOL_ALONE = 'tool: {modes: [{frequency: 200 Hz, damping_ratio: 2 %, stiffness: 1e7 N/m}]}\n'
