@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 
 from lathe_chatter.cli.common_options import add_json, in_unit, path_of, utf8
-from lathe_chatter.cli.console import Screen, writing
+from lathe_chatter.cli.console import INTERRUPTED, Screen, writing
 from lathe_chatter.cli.parameter_options import add_parameter_options, given_parameters
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
@@ -67,7 +67,13 @@ def run(options: Namespace) -> int:
     screen = Screen(json=options.json)
     screen.compile()
     begun = time.perf_counter()
-    done = _simulated(options, scenario, knocks, screen)
+    try:
+        done = _simulated(options, scenario, knocks, screen)
+    except KeyboardInterrupt:
+        if not options.output.exists():
+            raise
+        screen.say(f'Interrupted: the run up to there is in {options.output}.')
+        return INTERRUPTED
     spent = time.perf_counter() - begun
     ratio = done.time / spent
     shown = f'{ratio:.0f}' if ratio >= 9.95 else f'{ratio:.2g}'

@@ -87,7 +87,8 @@ def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
             color=colour, lw=0.9, label=name,
         )  # fmt: skip
     if top < _FAINTEST:
-        _say_at_rest(axes, 'no amplitude above 1 nm')
+        short = not any(spectrum.frequency.size for spectrum in spectra.values())
+        _say_at_rest(axes, 'too short for a spectrum' if short else 'no amplitude above 1 nm')
         top = _TOP_AT_REST
     axes.axvline(expected, color='k', lw=0.9, ls='--', label=f'root, {expected:.1f} Hz')
     axes.axvline(excerpt.cut.spindle_speed_rpm / 60.0, color='k', lw=0.9, ls=':', label='spindle')

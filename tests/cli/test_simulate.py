@@ -11,6 +11,7 @@ import pytest
 from lathe_chatter.cli import main as cli
 from lathe_chatter.knocks import resting_state
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.recording import read_run
 
 
 def test_a_knocked_cut_is_simulated_and_reported(
@@ -53,6 +54,19 @@ def test_a_full_disk_names_the_file_that_it_refuses(
         said
         == f'lathe-chatter report: {run}/report.png cannot be written: No space left on device.'
     )
+
+
+def test_an_interrupted_simulation_says_where_its_run_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(*_values: object, **_options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr('lathe_chatter.cli.console.Bar.show', interrupt)
+    run = tmp_path / 'run'
+    assert cli.main(['simulate', '--output', str(run), '--duration', '2']) == 130
+    assert f'Interrupted: the run up to there is in {run}.' in capsys.readouterr().out
+    assert 0 < read_run(run).samples().columns['time'].size < 20_000
 
 
 def test_a_scenario_whose_expectation_fails_is_exit_1(

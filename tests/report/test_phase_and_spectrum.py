@@ -35,6 +35,15 @@ def test_a_cut_at_rest_is_said_to_be_at_rest(depth: float, at_rest: bool) -> Non
     assert len(axes.lines) == (2 if at_rest else 4)
 
 
+def test_a_run_too_short_for_a_spectrum_is_not_said_to_be_at_rest() -> None:
+    lathe = VirtualLathe(cut=Cut(depth_of_cut=0.001))
+    samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(10).T, strict=True))
+    history = History(Path('run'), lathe.machine, lathe.cut, RunSamples.of(samples))
+    axes = Figure().add_subplot()
+    draw_spectrum(axes, history, excerpts_of(history)[-1])
+    assert [text.get_text() for text in axes.texts] == ['too short for a spectrum']
+
+
 def test_a_spectrum_ends_beyond_its_lines_not_at_a_mode_that_nobody_hears() -> None:
     """A workpiece of 2 kHz, 20 kHz samples: five times that were 10 kHz, all of it empty."""
     stiff = Mode(50.0, 2.0 * np.pi * 2000.0, 0.03)
