@@ -28,19 +28,19 @@ setup(
         # The inner loop, compiled without a compiler on the machine. compiled.py sets flags that
         # Numba documents nowhere: a newer one is allowed when the tests have passed with it.
         'numba>=0.59,<0.69',
-        'matplotlib>=3.7',  # the pictures of a run
+        'matplotlib>=3.6.3',  # the pictures of a run
         'rich>=13',  # tables and progress bars of the command line
         'argcomplete>=2',  # completion of the command line in shells, as ros2 has it
         'jinja2>=3.1',  # the page of the reproduction, from a template
         'pyyaml>=6.0.1',  # scenario files and metadata.yaml
         'rosbags>=0.11',  # reads the runs of any rosbag2 writer, and knows the message types
-        'mcap>=1.1',  # writes and reads MCAP
+        'mcap>=1.2.1',  # writes and reads MCAP; those before install a package `tests`, too
         'lz4>=4.0',  # the compression of the chunks of a run
         'zstandard>=0.22',  # that of runs written by others
         # The operator's page. Ordinary, for a node of the package needs them: 7 MB.
         'starlette>=0.40',  # routes, files and sockets
         'uvicorn>=0.35',  # the server
-        'websockets>=13',  # its sockets
+        'websockets>=15',  # its sockets; the first of which a client can be kept from proxies
         'isal>=1.5',  # the CRCs of a run in a quarter of the time that zlib takes
     ],
     # A run in other hands; each is asked for only where it is used.

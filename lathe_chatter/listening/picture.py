@@ -58,7 +58,8 @@ def draw_judged(
             label='' if k else 'chatter by its labels',
         )  # fmt: skip
     if flag.any() or labels:
-        figure.legend(loc='outside upper right', ncols=2, frameon=False)
+        # Not Matplotlib's own places outside of axes: Ubuntu 24.04 has 3.6, which knows none.
+        above.legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2, frameon=False)
     heard = [(each.time, each.frequency) for each in judged.estimates if each.chatter]
     if heard:
         below.plot(*zip(*heard, strict=True), '.', markersize=2, color=WORKPIECE)

@@ -147,7 +147,7 @@ class PageServer:
                 WebSocketRoute('/feed', self._feed),
                 Mount('/', StaticFiles(directory=_STATIC, html=True)),
             ],
-            middleware=[Middleware(GZipMiddleware), Middleware(_Guard, self._names)],
+            middleware=[Middleware(GZipMiddleware), Middleware(_Guard, names=self._names)],
         )
         self._server = _Server(
             uvicorn.Config(

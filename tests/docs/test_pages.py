@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from support.page_blocks import ROOT, Reader, blocks, pages
+from support.page_blocks import ROOT, Reader, blocks, packages_lacking, pages
 
 WITHOUT_ROS = [page for page in pages() if not any(block.talks_to_ros for block in blocks(page))]
 
@@ -14,6 +14,8 @@ WITHOUT_ROS = [page for page in pages() if not any(block.talks_to_ros for block 
 def test_what_a_page_says_can_be_typed(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if lacking := packages_lacking(page):
+        pytest.skip(f'not installed: {", ".join(lacking)}')
     monkeypatch.setenv('MPLBACKEND', 'Agg')
     monkeypatch.chdir(tmp_path)
     reader = Reader(tmp_path)

@@ -32,7 +32,8 @@ def test_a_run_is_plotted_with_what_the_monitor_flagged(tmp_path: Path) -> None:
     lc.simulate(scenario, tmp_path / 'run', monitor=True)
     run = lc.read_run(tmp_path / 'run')
     axes = run.plot(axes=Figure().subplots())
-    shades = [patch.get_x() for patch in axes.patches]
+    shapes = [(patch.get_path(), patch.get_patch_transform()) for patch in axes.patches]
+    shades = [path.get_extents(transform).x0 for path, transform in shapes]
     flagged = [m.log_time for m in run.messages('/chatter_monitor/chatter') if m.message.data]
     assert shades == pytest.approx(run.samples().simulated_time(flagged).tolist())
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [

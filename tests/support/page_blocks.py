@@ -10,8 +10,12 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass
+from importlib.metadata import distributions, requires
 from pathlib import Path
 from typing import Any
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from lathe_chatter.nodes.node_processes import die_with_parent
 
@@ -67,6 +71,16 @@ def blocks(page: Path) -> list[Block]:
         for found in _BLOCK.finditer(text)
         if found['kind'] in {'sh', 'python', 'matlab'}
     ]
+
+
+def packages_lacking(page: Path) -> list[str]:
+    """What a page asks for beside the package, as `pip install '.[cluster]'`, and is not here."""
+    asked = re.findall(r"pip install '(?:\.|lathe_chatter)\[([\w,]+)\]'", page.read_text('utf-8'))
+    extras = [{'extra': extra} for words in asked for extra in words.split(',')]
+    optional = [each for each in map(Requirement, requires('lathe_chatter') or ()) if each.marker]
+    wanted = {each.name for each in optional if any(map(each.marker.evaluate, extras))}
+    here = {canonicalize_name(each.name) for each in distributions()}
+    return sorted(name for name in wanted if canonicalize_name(name) not in here)
 
 
 class Reader:
