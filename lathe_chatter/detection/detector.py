@@ -153,7 +153,7 @@ class ChatterDetector:
             for adviser in self._advisers:
                 adviser.speed_range = speed_range
         self._told = machine
-        self._machine = machine if _has_single_modes(machine) else None
+        self._machine = machine if _has_plain_modes(machine) else None
         self._correction: tuple[float, float] | None = None
         if not first:
             self._begin_with_machine()
@@ -288,7 +288,11 @@ class ChatterDetector:
         )
 
 
-def _has_single_modes(machine: Machine | None) -> bool:
-    """Whether the machine, if there is one, has what the identification takes: a mode each."""
-    parts = () if machine is None else (machine.tool, machine.workpiece)
-    return not any(isinstance(part, Structure) for part in parts)
+def _has_plain_modes(machine: Machine | None) -> bool:
+    """Whether the machine, if there is one, has what the identification takes.
+
+    That is a mode each, which moves as the force acts.
+    """
+    modes = () if machine is None else (*machine.tool.modes, *machine.workpiece.modes)
+    plain = all(mode.chip == mode.force == mode.bearing == 1.0 for mode in modes)
+    return plain and len(modes) <= 2

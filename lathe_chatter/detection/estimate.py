@@ -28,7 +28,7 @@ class Mode(str, Enum):
     FULL = 'both displacements and the machine are known'
     CORRECTED = 'both displacements, and the machine with its tool as it is heard'
     MISFIT = 'no machine, for the one that was told does not fit what is heard'
-    MANY_MODES = 'no machine, for the one that was told has more than a mode each'
+    MANY_MODES = 'no machine, for the one that was told has more than a plain mode each'
     ONE_SENSOR = 'the motion of one body only'
     MIXTURE = 'sound or force alone, which does not tell how fast a vibration grows'
     NO_MACHINE = 'the machine is not known'

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from lathe_chatter.detection import ChatterDetector, Estimate
+from lathe_chatter.detection.estimate import Mode as WorksWith
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import rightmost_root
 
@@ -107,3 +108,20 @@ def test_it_is_never_told_the_answer() -> None:
     assert repr(whole.update(samples, SAMPLE_COLUMNS)) == repr(
         part.update(samples[:, seen], names)
     )
+
+
+@pytest.mark.parametrize(
+    'other',
+    [
+        {'tool': [Mode(0.05, 775.0, 0.008, chip=0.5), Mode(0.05, 900.0, 0.008)]},
+        {'tool': Mode(0.05, 775.0, 0.008, chip=0.5)},
+        {'workpiece': Mode(0.05, 650.0, 0.008, bearing=-3.0, chip=0.1)},
+    ],
+)
+def test_a_machine_that_is_not_identified_is_judged_without(other: dict[str, Any]) -> None:
+    """Also one whose chip would see a negative stiffness of the bearing."""
+    machine = Machine(**other)
+    detector = ChatterDetector(machine)
+    estimate = detector.update(VirtualLathe(machine).advance(10_000), SAMPLE_COLUMNS)
+    assert estimate.mode is WorksWith.MANY_MODES
+    assert math.isnan(estimate.margin)
