@@ -87,7 +87,7 @@ class ResultFile:
 
 
 def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
-    path: Path | None,
+    path: Path | str | None,
     header: Mapping[str, Any],
     function: Callable[[Item], Result],
     items: Sequence[Item],
@@ -109,7 +109,7 @@ def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
         ResultFileError: If the file is of something else, or cannot be written.
         WorkerError: If workers are lost, or have another version.
     """
-    file = ResultFile(path, {**header, 'code': code_identity()}) if path else None
+    file = ResultFile(Path(path), {**header, 'code': code_identity()}) if path else None
     with closing(file) if file else nullcontext():
         found = {e['place']: e['result'] for e in (file.entries if file else ())}
         if found:

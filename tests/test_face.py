@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -53,6 +55,35 @@ def test_the_names_for_type_checkers_are_those_of_the_table() -> None:
     (block,) = (node for node in source.body if isinstance(node, ast.If))
     imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
     assert sorted(each.name for node in imports for each in node.names) == sorted(lc._HOME)
+
+
+@pytest.mark.parametrize('name', sorted(set(lc.__all__) - {'__version__', 'Run'}))
+def test_a_path_may_be_a_text_everywhere(name: str) -> None:
+    called = getattr(lc, name)
+    if not callable(called):
+        return
+    try:
+        taken = inspect.signature(called).parameters.values()
+    except ValueError:  # an Enum
+        return
+    for parameter in taken:
+        kind = str(parameter.annotation)
+        assert 'Path' not in kind or 'str' in kind, f'{name}({parameter})'
+
+
+def test_a_run_is_made_and_proven_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scenario = replace(lc.load_scenario('no_clearance'), duration=0.2)
+    assert lc.simulate(scenario, 'run').samples == 2_000
+    assert [done.compared for done in lc.resimulate('run')] == [2_000]
+    lc.recover('run', 'saved')
+    assert lc.verify('saved').messages['/lathe/samples'] == 20
+    with lc.RunWriter('mine') as writer:
+        assert writer.folder == Path('mine')
+    lc.growth_map(lc.Machine(), lc.Cut(), [3000.0], [5e-4], kept_in='kept.jsonl')
+    assert Path('kept.jsonl').stat().st_size > 0
 
 
 def test_values_show_themselves_in_a_notebook() -> None:

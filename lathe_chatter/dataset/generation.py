@@ -70,7 +70,7 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
 
 def make_dataset(
     plan: Plan,
-    folder: Path,
+    folder: Path | str,
     *,
     executor: Executor | None = None,
     progress: Callable[[int, int], object] = lambda _done, _total: None,
@@ -94,6 +94,7 @@ def make_dataset(
     """
     identity = hashlib.sha256(repr(plan).encode()).hexdigest()[:16]
     header = {'kind': 'lathe_chatter data set 2', 'plan': identity, 'code': code_identity()}
+    folder = Path(folder)
     manifest = folder / MANIFEST
     try:
         if folder.is_dir() and not manifest.exists() and any(folder.iterdir()):
@@ -153,7 +154,7 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def read_windows(folder: Path, split: str | None = None) -> Table:
+def read_windows(folder: Path | str, split: str | None = None) -> Table:
     """The windows of a data set as arrays by column, of one split or of all.
 
     Args:

@@ -99,12 +99,13 @@ class Plan:
         return dict(zip(self.splits, ranges, strict=True))
 
 
-def load_plan(path: Path) -> Plan:
+def load_plan(path: Path | str) -> Plan:
     """Read and check a plan.
 
     Raises:
         PlanError: With file, line, field, value, unit and what is allowed.
     """
+    path = Path(path)
     try:
         text = path.read_text(encoding='utf-8')
         return _plan(section_of(text, str(path)), path, text)

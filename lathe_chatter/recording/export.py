@@ -203,7 +203,10 @@ class ExportedParts:
         wanted = first.columns if chosen.columns is None else (TIME, *chosen.columns)
         missing = sorted(set(wanted) - set(first.columns))
         if missing:
-            raise RunReadError(f'The samples of {run.path} have no column {", ".join(missing)}.')
+            raise RunReadError(
+                f'The samples of {run.path} have no column {", ".join(missing)}, only '
+                f'{", ".join(first.columns)}.'
+            )
         self.names = tuple(name for name in first.columns if name in wanted)
 
     def __iter__(self) -> Iterator[Array]:

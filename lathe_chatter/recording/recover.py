@@ -41,7 +41,7 @@ class Recovery(NamedTuple):
     lost: list[str]
 
 
-def recover(path: Path | str, output: Path) -> Recovery:
+def recover(path: Path | str, output: Path | str) -> Recovery:
     """Save what is sound of a run, every message with its own type; the original is only read.
 
     Args:
@@ -53,7 +53,7 @@ def recover(path: Path | str, output: Path) -> Recovery:
         RunExistsError: If the folder to make exists.
         OSError: If it cannot be written.
     """
-    old = read_run(path, damaged=True)
+    old, output = read_run(path, damaged=True), Path(output)
     distribution = str(((old.folder and old.folder.metadata) or {}).get('ros_distro', 'unknown'))
     with atomic_folder(output):
         copy = _Copy(output, distribution)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from lathe_chatter.recording.provenance import (
 )
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, recorded_cuts
 from lathe_chatter.recording.resimulated_lathe import Difference, Replay
-from lathe_chatter.recording.run import Run
+from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.recording.verify import Finding
@@ -62,15 +63,19 @@ class Resimulation:
         return self.reproduced and not self.contradictions
 
 
-def resimulate(run: Run) -> list[Resimulation]:
+def resimulate(run: Run | Path | str) -> list[Resimulation]:
     """Compute the samples of every lathe of a run again.
 
     Where samples are missing the lathe cuts on without comparing.
+
+    Args:
+        run: That was read, or where it is.
 
     Raises:
         RunReadError: If a file is damaged and the run was not opened for that, or there are no
             samples of a lathe in it.
     """
+    run = run if isinstance(run, Run) else read_run(run)
     names = [
         name
         for name, kind in sorted(run.topics.items())

@@ -45,7 +45,7 @@ class RunWriter(AbstractContextManager['RunWriter']):
 
     def __init__(  # noqa: PLR0913 -- what a user may choose of a recording
         self,
-        folder: Path,
+        folder: Path | str,
         *,
         distribution: str = '',
         min_free_space: int = 0,
@@ -54,7 +54,7 @@ class RunWriter(AbstractContextManager['RunWriter']):
         compression: Compression = Compression.LZ4,
     ) -> None:
         """Make the folder with a first, empty file and its metadata."""
-        self.folder = folder
+        self.folder = folder = Path(folder)
         self._files = RunFiles(
             folder,
             distribution or os.environ.get('ROS_DISTRO', 'unknown'),

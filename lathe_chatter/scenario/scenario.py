@@ -123,14 +123,18 @@ def find_scenario(name_or_path: str) -> Path:
     return path
 
 
-def load_scenario(path: Path) -> Scenario:
+def load_scenario(path: Path | str) -> Scenario:
     """Read and check a scenario file.
 
     Changes are checked here, parameters of the start by the lathe that gets them.
 
+    Args:
+        path: Of the file; as a text also the name of one that is shipped.
+
     Raises:
-        ScenarioError: If the file is no scenario.
+        ScenarioError: If there is no such file, or it is no scenario.
     """
+    path = find_scenario(path) if isinstance(path, str) else path
     try:
         raw = yaml.safe_load(path.read_text(encoding='utf-8'))
     except OSError as error:

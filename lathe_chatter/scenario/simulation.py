@@ -65,7 +65,7 @@ def needs_monitor(scenario: Scenario) -> bool:
 
 def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who is told
     scenario: Scenario,
-    folder: Path,
+    folder: Path | str,
     *,
     knocks: Sequence[Knock] = (),
     monitor: bool = True,
@@ -87,7 +87,7 @@ def simulate(  # noqa: PLR0913 -- what is played, where to, who watches and who 
         RunExistsError: If the folder exists.
         OSError: If it cannot be written.
     """
-    config = config_from(scenario.parameters)
+    folder, config = Path(folder), config_from(scenario.parameters)
     lathe = config.lathe()
     with LatheRun(folder, config.parameters(), simulated=True) as run:
         run.log(BEGINNING)

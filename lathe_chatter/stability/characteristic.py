@@ -205,7 +205,8 @@ class Cuts:
         different: dict[int, Machine] = {id(machine): machine for machine in given.ravel()}
         number = {key: k for k, key in enumerate(different)}
         which = np.array([number[id(machine)] for machine in given.ravel()], dtype=np.int64)
-        numbers, speeds, depths = np.broadcast_arrays(which.reshape(given.shape), speeds, depths)
+        shared = np.broadcast_arrays(which.reshape(given.shape), speeds, depths)
+        numbers, speeds, depths = map(np.array, shared)  # compiled code wants arrays of their own
         several = [
             sections_of(machine, seated=seated, least_damping=least_damping)
             for machine in different.values()

@@ -51,7 +51,7 @@ def growth_map(  # noqa: PLR0913 -- a cut, the points, and who is told
     tool_leaves_cut: bool = True,
     law: SpeedLaw | str = SpeedLaw.SPEED,
     executor: Executor | None = None,
-    kept_in: Path | None = None,
+    kept_in: Path | str | None = None,
     progress: Callable[[int], object] = lambda _count: None,
 ) -> GrowthMap:
     """The growth rate at every speed and depth, at the clearance and feed speed of a cut.

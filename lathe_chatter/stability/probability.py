@@ -78,7 +78,7 @@ def stability_probability(  # noqa: PLR0913 -- what is cut, how sure that is, an
     seed: int = 0,
     tool_leaves_cut: bool = True,
     executor: Executor | None = None,
-    kept_in: Path | None = None,
+    kept_in: Path | str | None = None,
     progress: Callable[[int], object] = lambda _count: None,
 ) -> StabilityProbability:
     """Draw machines and find the safe limit of each.

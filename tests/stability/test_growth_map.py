@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,12 @@ def test_each_point_is_the_root_in_its_contact(contact: BearingContact) -> None:
     if contact is BearingContact.GAP:
         assert found.seated.any()
         assert not found.seated.all()
+
+
+def test_no_library_warns_of_it() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        growth_map(MACHINE, Cut(), [2800, 3000], [4e-4, 6e-4])
 
 
 def test_its_zero_is_the_edge_of_the_safe_region() -> None:
