@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from lathe_chatter.lathe.integrator.coefficients import constants_of, steps_per_sample
+from lathe_chatter.lathe.integrator.coefficients import constants_of
+from lathe_chatter.lathe.integrator.step_size import steps_per_sample
 from lathe_chatter.model import Cut
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 

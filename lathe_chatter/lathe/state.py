@@ -15,8 +15,9 @@ from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
-from lathe_chatter.lathe.integrator.coefficients import Constants, constants_of, steps_per_sample
+from lathe_chatter.lathe.integrator.coefficients import Constants, constants_of
 from lathe_chatter.lathe.integrator.eigenvectors import product
+from lathe_chatter.lathe.integrator.step_size import steps_per_sample
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.model.quantity_fields import Quantity

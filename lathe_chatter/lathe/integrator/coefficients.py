@@ -11,7 +11,7 @@ and turned into the coordinates of the regime's eigenvectors, measured from its 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,16 +20,11 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.eigenvectors import Basis, basis_of, inverse_of, product
-from lathe_chatter.lathe.integrator.propagation import RATE_STEP, TERMS
+from lathe_chatter.lathe.integrator.propagation import TERMS
 from lathe_chatter.lathe.integrator.surface import aligned
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 
-_TURN_PER_STEP = 0.05
-_TURN_PER_STEP_UNBALANCED = 0.02
-"""The force of an unbalance turns with the spindle, and is held by a quintic too."""
-_MOST_STEPS = 200_000
-_MOST_STEPS_A_TURN = 50_000_000
 _LEAST_SPAN = 1024.0
 
 _TOUCHES = {
@@ -98,29 +93,17 @@ class Constants(NamedTuple):
 def constants_of(setup: LatheSetup, cut: Cut, steps: int) -> Constants:
     """The constants for a cut that takes so many steps a sample."""
     settings, shapes = settings_of(setup, cut, steps), shapes_of(setup.machine)
-    step, width = settings[layout.STEP_LENGTH], 2 * len(shapes.frequency)
+    width = 2 * len(shapes.frequency)
     rules = np.zeros((layout.REGIMES, layout.ROWS, width))
     outputs = np.zeros((layout.REGIMES, width + 1, layout.OUTPUTS))
     direct = np.zeros((layout.REGIMES, layout.DIRECT))
     matrices = np.zeros((layout.REGIMES, 2, width, width))
     bases, rests = {}, {}
     for regime in regimes_of(setup, cut):
-        matrix, push = motion(setup.machine, shapes, settings, regime)
-        basis = bases[regime] = basis_of(matrix, _scale(shapes, step))
-        rest = rests[regime] = _rest(matrix, push)
-        _fill_rules(shapes, settings, matrix, basis, regime, rules[regime], matrices[regime])
-        _fill_outputs(shapes, matrix, basis, rest, outputs[regime])
-        direct[regime] = _direct(shapes, settings, regime, basis)
-        rows = rules[regime]
-        rows[layout.RELATIVE_RATE_ROW] = (
-            outputs[regime, :-1, layout.TOOL_V] - outputs[regime, :-1, layout.WORKPIECE_V]
-        )
-        for row, shape in (
-            (layout.TOOL_ACCELERATION, shapes.tool),
-            (layout.WORKPIECE_ACCELERATION, shapes.workpiece),
-        ):
-            below = product(shape[None], matrix[width // 2 :]) / (step * step)
-            rows[row] = product(below, basis.vectors)[0]
+        known = _regime(setup.machine, regime, *acting_in(settings, regime))
+        bases[regime], rests[regime] = known.basis, known.rest
+        rules[regime], outputs[regime] = known.rules, known.outputs
+        direct[regime], matrices[regime] = known.direct, known.matrices
     moves = np.zeros((layout.REGIMES, layout.REGIMES, width + 1, width))
     for old, basis in bases.items():
         for new, other in bases.items():
@@ -131,6 +114,62 @@ def constants_of(setup: LatheSetup, cut: Cut, steps: int) -> Constants:
     flat = aligned(sum(map(len, parts)))
     np.concatenate(parts, out=flat)
     return Constants(settings, flat, shapes, bases, rests, rules, outputs)
+
+
+class _Regime(NamedTuple):
+    """What `Constants` have of one regime."""
+
+    basis: Basis
+    rest: Array
+    rules: Array
+    outputs: Array
+    direct: Array
+    matrices: Array
+
+
+_ACTING = (layout.STEP_LENGTH, layout.CUTTING_STIFFNESS, layout.PROCESS_DAMPING, layout.CLEARANCE)
+"""The settings that a regime depends on."""
+
+
+def acting_in(settings: Array, regime: int) -> tuple[float, float, float, float]:
+    """Those settings, as far as they act in a regime: what no cut changes is computed once."""
+    step, stiffness, damping, clearance = (float(settings[place]) for place in _ACTING)
+    if not regime & layout.IN_CUT:
+        stiffness = damping = 0.0
+    return step, stiffness, damping, clearance if regime >> 1 else 0.0
+
+
+@lru_cache(maxsize=256)
+def _regime(machine: Machine, regime: int, *acting: float) -> _Regime:
+    shapes, settings = shapes_of(machine), np.zeros(layout.SETTINGS_SIZE)
+    settings[list(_ACTING)] = acting
+    step, width = settings[layout.STEP_LENGTH], 2 * len(shapes.frequency)
+    rules, outputs = np.zeros((layout.ROWS, width)), np.zeros((width + 1, layout.OUTPUTS))
+    matrices = np.zeros((2, width, width))
+    matrix, push = motion(machine, shapes, settings, regime)
+    basis, rest = basis_in(machine, regime, *acting[:3]), _rest(matrix, push)
+    _fill_rules(shapes, settings, matrix, basis, regime, rules, matrices)
+    _fill_outputs(shapes, matrix, basis, rest, outputs)
+    rules[layout.RELATIVE_RATE_ROW] = (
+        outputs[:-1, layout.TOOL_V] - outputs[:-1, layout.WORKPIECE_V]
+    )
+    for row, shape in (
+        (layout.TOOL_ACCELERATION, shapes.tool),
+        (layout.WORKPIECE_ACCELERATION, shapes.workpiece),
+    ):
+        below = product(shape[None], matrix[width // 2 :]) / (step * step)
+        rules[row] = product(below, basis.vectors)[0]
+    direct = _direct(shapes, settings, regime, basis)
+    return _Regime(basis, rest, rules, outputs, direct, matrices)
+
+
+@lru_cache(maxsize=256)
+def basis_in(machine: Machine, regime: int, *acting: float) -> Basis:
+    """The coordinates of a regime, by all that acts in it but the clearance."""
+    shapes, settings = shapes_of(machine), np.zeros(layout.SETTINGS_SIZE)
+    settings[list(_ACTING[:3])] = acting
+    matrix, _ = motion(machine, shapes, settings, regime)
+    return basis_of(matrix, _scale(shapes, settings[layout.STEP_LENGTH]))
 
 
 def regimes_of(setup: LatheSetup, cut: Cut) -> list[int]:
@@ -272,6 +311,7 @@ def _fill_rules(
     matrices[0], matrices[1] = basis.generator, state
 
 
+@cache
 def _hermite() -> Array:
     """Coefficients (6,) of the quintics with one of u, u', u'' at either end 1 and the rest 0."""
     result = np.zeros((6, 6))
@@ -284,6 +324,7 @@ def _hermite() -> Array:
     return result
 
 
+@lru_cache(maxsize=64)
 def between_nodes(part: float) -> Array:
     """What two nodes a step apart tell of the surface a part of the way on (3, 5).
 
@@ -349,52 +390,3 @@ def _direct(shapes: Shapes, settings: Array, regime: int, basis: Basis) -> Array
     result[: layout.COUPLED] = product(seen, acting).ravel()
     result[[layout.COUPLED, layout.RATE]] = float(not basis.in_pairs), basis.rate
     return result
-
-
-def steps_per_sample(setup: LatheSetup, cut: Cut, speed: float) -> int:
-    """Steps so short that the series converge and that a turn has many of them.
-
-    Args:
-        setup: Machine, force law and sampling.
-        cut: The cut.
-        speed: The spindle speed now, rev/s, without its variation.
-
-    Raises:
-        ParameterError: If a sample would take more steps than anyone could wait for, or a turn
-            more than there is memory for.
-    """
-    rate = setup.sample_rate
-    fastest = _fastest(setup, cut, speed) * rate
-    turning = max(cut.spindle_speed_rpm / 60.0, speed) * (1.0 + cut.speed_variation_amplitude)
-    a_step = _TURN_PER_STEP if cut.unbalance == 0.0 else _TURN_PER_STEP_UNBALANCED
-    needed = max(fastest / RATE_STEP, turning / a_step)
-    if not needed <= _MOST_STEPS * rate:
-        allowed = (
-            f'at least {needed / _MOST_STEPS:.0f} Hz for a machine with motions of up to '
-            f'{fastest:.0f} rad/s'
-        )
-        raise ParameterError('sample_rate', rate, 'Hz', allowed)
-    steps = max(1, math.ceil(needed / rate))
-    slowest = min(cut.spindle_speed_rpm / 60.0, speed) * (1.0 - cut.speed_variation_amplitude)
-    if rate * steps > _MOST_STEPS_A_TURN * slowest:
-        least = rate * steps / _MOST_STEPS_A_TURN * 60.0
-        allowed = f'at least {least:.3g} rev/min where a second has {rate * steps:.0f} steps'
-        raise ParameterError('spindle_speed_rpm', cut.spindle_speed_rpm, 'rev/min', allowed)
-    return steps
-
-
-def _fastest(setup: LatheSetup, cut: Cut, speed: float) -> float:
-    """The largest |lambda| of any regime at any speed to come, per sample."""
-    shapes = shapes_of(setup.machine)
-    slowest = min(cut.spindle_speed_rpm / 60.0, speed) * (1.0 - cut.speed_variation_amplitude)
-    if cut.process_damping == 0.0 or slowest * 60.0 >= cut.spindle_speed_rpm:
-        settings = settings_of(setup, cut, 1)
-    else:
-        settings = settings_of(setup, cut, 1).copy()
-        settings[layout.PROCESS_DAMPING] *= cut.spindle_speed_rpm / (60.0 * slowest)
-    rate = 0.0
-    for regime in regimes_of(setup, cut):
-        matrix, _ = motion(setup.machine, shapes, settings, regime)
-        basis = basis_of(matrix, _scale(shapes, settings[layout.STEP_LENGTH]))
-        rate = max(rate, basis.rate)
-    return rate
