@@ -68,7 +68,7 @@ def speed() -> list[Line]:
     for name, run in runs.items():
         note = f'best {min(run.costs):.1f}; {run.events} events in 10,000 steps'
         lines.append(Figure(f'step, {name}', median(run.costs), 'ns', run.goal, note=note))
-    return [*lines, _tick()]
+    return [*lines, _tick(), *_changes()]
 
 
 _TURNS = 41
@@ -140,3 +140,20 @@ def _tick() -> Line:
         'a tick of 20 samples, called from Python', median(costs), 'us', 3.0,
         note=f'best {min(costs):.2f}',
     )  # fmt: skip
+
+
+def _changes() -> list[Line]:
+    """What a change of the cut costs between two ticks, each to a value that it never had."""
+    lines: list[Line] = []
+    for name in ('depth_of_cut', 'spindle_speed_rpm'):
+        lathe, costs = VirtualLathe(), []
+        lathe.advance(1000)
+        for k in range(201):
+            cut = lathe.cut.with_changes(**{name: getattr(Cut(), name) * (1.1 + 1e-6 * k)})
+            then = time.thread_time()
+            lathe.retune(cut)
+            costs.append(1e6 * (time.thread_time() - then))
+            lathe.advance(20)
+        note = f'best {min(costs):.0f}'
+        lines.append(Figure(f'a change of {name}', median(costs), 'us', note=note))
+    return lines
