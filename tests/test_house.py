@@ -36,7 +36,7 @@ ARROWS = {
     'stability': {'model'},
     'detection': {'model', 'stability'},
     'knocks': {'model', 'lathe', 'stability'},
-    'supervisor': {'model', 'stability'},
+    'supervisor': {'model', 'lathe', 'stability', 'knocks'},
     'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'lathe', 'detection', 'recording'},

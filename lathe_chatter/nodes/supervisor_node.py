@@ -32,7 +32,7 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
-from lathe_chatter.supervisor.move_search import may_be
+from lathe_chatter.supervisor.likely_machines import may_be
 
 _LOOK_PERIOD = 0.02
 _SILENCE = 1.0
@@ -65,7 +65,7 @@ class SupervisorNode(ParameterNode):
         """Listen, and hold still until it is known who else is there."""
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
         # Compiled or loaded before there is any hurry.
-        list(moves_for(may_be(Machine(), 0.01), Cut(), Limits()))
+        list(moves_for(may_be(Machine(), 0.01), Cut(), Limits(), amplitude=1e-5))
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
         self._state = ''
         self._chatter: bool | None = None  # until the monitor has said

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantity_fields import check_fields, limits_of, quantity
-from lathe_chatter.model.uncertainty import equally_uncertain
 from lathe_chatter.stability import (
     ProcessDamping,
     critical_depths,
@@ -26,16 +24,22 @@ from lathe_chatter.stability import (
     rightmost_roots,
     seating_depth,
 )
+from lathe_chatter.supervisor.likely_machines import carried, contacts_of
+from lathe_chatter.supervisor.rehearsal import dies
 
-_MACHINES, _VARIED = 32, 8
-"""Machines that the truth may be, and those of them that a varied speed has to suit."""
-_ODD = (0, 2, 6)
+_VARIED, _REHEARSED, _FAILING = 8, 4, 1
+"""Of the machines that the truth may be: those that a varied speed has to suit, those on which a
+move is rehearsed, and those of them, never the told one, on which that may fail."""
+ODD, MOST_ODD = (0, 2, 6), (12,)
 """Of the machines, those that a move need not suit: none, and more where there is no such move."""
 _SPEEDS = 240
-_RESERVE = 1.03
+_MOST_TRIED = 10
+"""Moves that are rehearsed before others are looked for."""
+_RESERVE = 1.05
 """By which a depth stays away from every limit."""
 _SHORT_WAY = 0.05
 """Part of the removal rate that a speed e times as far away has to be worth."""
+_SHALLOWER = 0.75
 _ONE_CONTACT, _VARYING = 0.85, 0.9
 """Worth of what suits one contact of the bearing alone, and of a varied speed."""
 _SURE_DECAY = -1.0
@@ -44,15 +48,6 @@ _NEARLY_ALL = 0.9
 """Of the removal rate: a move that keeps it leaves no need to look for others than speeds."""
 _SLOWEST_SWING = 0.2
 """Frequency of a variation below which none is tried, Hz."""
-_SURGE = 5.0
-"""Times that vibration may grow to while the varied speed passes where it grows."""
-_MOST_HEARD = 2.0
-"""Times the told C w that may be heard."""
-_FIT, _FIT_GROWTH = 0.004, 4.0
-"""Part of the frequency of chatter, and 1/s of its growth, within which it is that of the told
-machine: of machines told 5 % off a tenth fit so well."""
-_WAY = 24
-"""Speeds on the way to another one that are looked at."""
 
 
 def _speed(meaning: str, default: float) -> float:
@@ -129,70 +124,10 @@ def removal_rate(cut: Cut) -> float:
     return cut.depth_of_cut * cut.feed * cut.spindle_speed_rpm / 60.0
 
 
-def as_heard(
-    machine: Machine, cut: Cut, cutting_stiffness: float, tool_frequency: float
-) -> Machine:
-    """The machine with what is heard of it; nan where nothing is.
-
-    Chatter that leaves the cut makes C w look less than it is, and much more than was told is an
-    error: a cut begun a moment ago, or not this one.
-
-    Args:
-        machine: As told.
-        cut: That is heard.
-        cutting_stiffness: C w, N/m.
-        tool_frequency: Natural frequency of a tool with one mode, Hz.
-    """
-    told = machine.cutting_stiffness(cut.depth_of_cut)
-    if 0.0 < told < cutting_stiffness < _MOST_HEARD * told:
-        machine = replace(machine, cutting_coefficient=cutting_stiffness / cut.depth_of_cut)
-    if math.isfinite(tool_frequency) and len(machine.tool.modes) == 1:
-        omega = 2.0 * math.pi * tool_frequency
-        machine = replace(machine, tool=replace(machine.tool.modes[0], natural_frequency=omega))
-    return machine
-
-
-def fits(machine: Machine, cut: Cut, frequency: float, growth_rate: float) -> bool:
-    """Whether chatter that is heard, Hz and 1/s, is that of the machine as told."""
-    each = [_carried(machine, part) for part in _contacts(cut)[0][0]]
-    roots = rightmost_roots(
-        each, cut.spindle_speed_rpm, cut.depth_of_cut, seated=True, process=ProcessDamping.of(cut),
-        proven=False,
-    )  # fmt: skip
-    near = np.abs(roots.imag - 2.0 * math.pi * frequency) < _FIT * roots.imag
-    return bool((near & (np.abs(roots.real - growth_rate) < _FIT_GROWTH)).any())
-
-
-def may_be(machine: Machine, error: float) -> list[Machine]:
-    """Machines that the truth may be, the told one first.
-
-    Args:
-        machine: As told.
-        error: Relative standard error of every figure of it.
-    """
-    drawn, _ = equally_uncertain(machine, error).draw(machine, _MACHINES - 1 if error else 0)
-    parts = np.exp(error * np.random.default_rng(1).standard_normal(len(drawn)))
-    return [machine, *(_carried(each, part) for each, part in zip(drawn, parts, strict=True))]
-
-
-def _carried(machine: Machine, part: float) -> Machine:
-    """The machine with a part of its bearing's stiffness."""
-    return replace(machine, bearing_stiffness=float(part) * machine.bearing_stiffness)
-
-
-def chance_of(machines: Sequence[Machine], cut: Cut) -> float:
-    """The share of some machines on which a cut is stable, whatever its bearing does."""
-    parts, _ = _contacts(cut)[0]
-    each = np.array([[_carried(m, part) for part in parts] for m in machines], dtype=object)
-    depths = critical_depths(
-        each, cut.spindle_speed_rpm, seated=True, process=ProcessDamping.of(cut)
-    )
-    return float(np.mean(depths.min(axis=1) > cut.depth_of_cut))
-
-
-def moves_for(
-    machines: Sequence[Machine], cut: Cut, limits: Limits, amplitude: float = 0.0
-) -> Iterator[Move]:
+def moves_for(  # noqa: PLR0913, PLR0917 -- a cut, and all that a move has to keep to
+    machines: Sequence[Machine], cut: Cut, limits: Limits, amplitude: float = 0.0,
+    reserve: float = 1.0, odd_ones: Sequence[int] = ODD,
+) -> Iterator[Move]:  # fmt: skip
     """Moves that are predicted to end chatter, the one of greatest worth first.
 
     A cut that chatters across a clearance is open and seated in turn, so a move that suits both
@@ -202,36 +137,52 @@ def moves_for(
         machines: That the truth may be, the told one first, see `may_be`.
         cut: The present one.
         limits: That no move leaves.
-        amplitude: Of the vibration now, m: it must not pass its limit on the way.
+        amplitude: Of the vibration now, m: it must not pass its limit on the way, and has to die;
+            0 where there is none.
+        reserve: By which a depth stays away from every limit, more than usual.
+        odd_ones: Of the machines, how many a move need not suit, tried in turn.
     """
     if not cut.depth_of_cut > 0.0:
         return
-    searches = [_Search(machines, cut, limits, *contact) for contact in _contacts(cut)]
-    passable = False
-    for odd in _ODD:
-        if passable or odd >= len(machines):
+    searches = [
+        _Search(machines, cut, limits, reserve * _RESERVE, *contact)
+        for contact in contacts_of(cut)
+    ]
+    for odd in odd_ones:
+        if odd >= len(machines):
             return
         found = [each for search in searches for each in search.constant_speeds(odd)]
         if not any(removal_rate(each.cut) > _NEARLY_ALL * removal_rate(cut) for each in found):
             for search in searches:
                 found += [*search.smaller_feeds(odd), *search.varied_speeds(odd)]
-        for each in sorted(found, key=lambda each: -each.worth):
-            if amplitude * each.search.rise(each.cut) <= limits.amplitude_limit:
+        passable = False
+        for each in sorted(found, key=lambda each: -each.worth)[:_MOST_TRIED]:
+            move = each.search.move(each.cut, 1.0 - odd / len(machines))
+            if _passes(machines, cut, move, limits, amplitude):
                 passable = True
-                yield each.search.move(each.cut, 1.0 - odd / len(machines))
+                yield move
+        if passable:
+            return
 
 
-def _contacts(cut: Cut) -> list[tuple[tuple[float, ...], int]]:
-    """What a cut may be on its bearing.
-
-    Returns:
-        The parts of the bearing's stiffness that carry: 0 while the workpiece floats, 1 while it
-        is seated, and some where it is seated for a part of each cycle; and the side of the
-        seating line, -1 below it, 1 above it, 0 for either.
-    """
-    if cut.bearing_contact in {BearingContact.NONE, BearingContact.SEATED}:
-        return [((float(cut.bearing_contact is BearingContact.SEATED),), 0)]
-    return [((0.0, 0.5, 1.0), 0), ((0.0,), -1), ((1.0,), 1)]
+def _passes(
+    machines: Sequence[Machine], cut: Cut, move: Move, limits: Limits, amplitude: float
+) -> bool:
+    """Whether vibration of an amplitude dies by a move, and keeps to its limit on the way."""
+    if not amplitude:
+        return True
+    failed = 0
+    for machine in machines[:_REHEARSED]:
+        try:
+            failed += not dies(
+                machine, cut, move.cut, growth_rate=move.growth_rate, ramp=limits.ramp,
+                amplitude=amplitude, amplitude_limit=limits.amplitude_limit,
+            )  # fmt: skip
+        except ParameterError:  # no lathe is computed that turns so slowly: roots alone tell
+            return True
+        if failed and (machine is machines[0] or failed > _FAILING):
+            return False
+    return True
 
 
 class _Candidate(NamedTuple):
@@ -245,14 +196,14 @@ class _Candidate(NamedTuple):
 class _Search:
     """Looks for another cut that is stable in some contact with the bearing."""
 
-    def __init__(
-        self, machines: Sequence[Machine], cut: Cut, limits: Limits, parts: Sequence[float],
-        side: int,
+    def __init__(  # noqa: PLR0913, PLR0917 -- what it looks among
+        self, machines: Sequence[Machine], cut: Cut, limits: Limits, reserve: float,
+        parts: Sequence[float], side: int,
     ) -> None:  # fmt: skip
         """Compute the limits of all machines, in order at each speed."""
-        self._cut, self._limits, self._side = cut, limits, side
+        self._cut, self._limits, self._reserve, self._side = cut, limits, reserve, side
         self._process = ProcessDamping.of(cut)
-        self._machines = [[_carried(machine, part) for part in parts] for machine in machines]
+        self._machines = [[carried(machine, part) for part in parts] for machine in machines]
         low, high = limits.slowest_speed, limits.fastest_speed
         # Whole numbers, as a machinist would set them, and the present one.
         even = np.round(60.0 / np.linspace(60.0 / high, 60.0 / low, _SPEEDS))
@@ -263,7 +214,7 @@ class _Search:
             self._feed = 60.0 * cut.feed_speed / self._speeds
         each = np.array(self._machines, dtype=object)[:, :, None]
         depths = critical_depths(each, self._speeds, seated=True, process=self._process)
-        self._deepest: Array = np.sort(depths.min(axis=1), axis=0) / _RESERVE
+        self._deepest: Array = np.sort(depths.min(axis=1), axis=0) / reserve
         # A seating line is inverse to the feed.
         line = [seating_depth(machine, cut.bearing_clearance, 1.0) for machine in machines]
         self._line: Array = np.sort(line)[:, None] / np.maximum(self._feed, 1e-30)
@@ -272,8 +223,10 @@ class _Search:
         """Above which depth, and up to which, all machines but some are stable, at each speed."""
         deepest = self._deepest[odd]
         if self._side < 0:
-            deepest = np.minimum(deepest, self._line[odd] / _RESERVE)
-        shallowest = self._line[-1 - odd] * _RESERVE if self._side > 0 else np.zeros_like(deepest)
+            deepest = np.minimum(deepest, self._line[odd] / self._reserve)
+        shallowest = np.zeros_like(deepest)
+        if self._side > 0:
+            shallowest = self._line[-1 - odd] * self._reserve
         return shallowest, deepest
 
     def _at_present(self, values: Array) -> float:
@@ -295,14 +248,18 @@ class _Search:
         worth = np.where(allowed, worth, -np.inf)
         beside = np.pad(worth, 1, constant_values=-np.inf)
         best = allowed & (worth >= beside[:-2]) & (worth >= beside[2:])
+        least = np.maximum(min(limits.smallest_depth, cut.depth_of_cut), shallowest)
         for k in np.flatnonzero(best).tolist():
-            changes = {'spindle_speed_rpm': self._speeds[k], 'depth_of_cut': depth[k]}
-            yield self._candidate(worth[k], changes)
+            # Large vibration that the greatest depth would keep may die in a smaller one.
+            for part in (1.0, _SHALLOWER)[: 1 + bool(self._side)]:
+                changes = {'spindle_speed_rpm': self._speeds[k],
+                           'depth_of_cut': max(part * depth[k], least[k])}  # fmt: skip
+                yield self._candidate(part * worth[k], changes)
 
     def smaller_feeds(self, odd: int) -> Iterator[_Candidate]:
         """The largest feed at which the mean force leaves the workpiece floating."""
         cut = self._cut
-        part = self._at_present(self._line[odd]) / _RESERVE / cut.depth_of_cut
+        part = self._at_present(self._line[odd]) / self._reserve / cut.depth_of_cut
         stable = self._at_present(self._deepest[odd]) >= cut.depth_of_cut
         if self._side < 0 and stable and self._limits.smallest_feed / cut.feed <= part < 1.0:
             name = 'feed_per_revolution' if cut.feed_per_revolution else 'feed_speed'
@@ -324,7 +281,7 @@ class _Search:
                 changes = {'speed_variation_amplitude': amplitude,
                            'speed_variation_frequency': frequency}  # fmt: skip
                 new = cut.with_changes(**changes)
-                if self.rise(new) < _SURGE and all(
+                if all(
                     self._growth(number, new) < _SURE_DECAY
                     for number in range(min(_VARIED, len(self._machines)))
                 ):
@@ -351,29 +308,11 @@ class _Search:
         """The greatest growth rate of one of the machines, 1/s."""
         if new.speed_variation_amplitude:
             return max(floquet(m, new, seated=True).growth_rate for m in self._machines[number])
-        return float(self._rates(number, new.spindle_speed_rpm, new.depth_of_cut).max())
-
-    def _rates(self, number: int, rpm: ArrayLike, depth: float) -> Array:
-        """Growth rates of one of the machines at constant speeds, 1/s (n,)."""
-        each = np.array(self._machines[number], dtype=object)[:, None]
         roots = rightmost_roots(
-            each, np.atleast_1d(rpm), depth, seated=True, process=self._process, proven=False
-        )
-        return np.asarray(roots.real.max(axis=0))
-
-    def rise(self, new: Cut) -> float:
-        """How many times its amplitude the vibration may grow to while the speed changes."""
-        rpm = self._cut.spindle_speed_rpm, new.spindle_speed_rpm
-        lasting = abs(rpm[1] - rpm[0]) / self._limits.ramp / _WAY
-        on_the_way = np.linspace(*rpm, _WAY)
-        if swing := new.speed_variation_amplitude:  # and while it varies
-            lasting = 1.0 / new.speed_variation_frequency / _WAY
-            on_the_way = rpm[1] * (1.0 + swing * np.sin(np.linspace(0.0, 4.0 * np.pi, 2 * _WAY)))
-        grown = highest = 0.0
-        for rate in self._rates(0, on_the_way, new.depth_of_cut) * lasting:
-            grown = max(grown + rate, 0.0)
-            highest = max(highest, grown)
-        return math.exp(min(highest, 50.0))
+            self._machines[number], new.spindle_speed_rpm, new.depth_of_cut,
+            seated=True, process=self._process, proven=False,
+        )  # fmt: skip
+        return float(roots.real.max())
 
 
 def change_words(changes: Mapping[str, float], cut: Cut) -> str:

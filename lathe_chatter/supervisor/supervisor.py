@@ -3,44 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import chain
-from statistics import median
 
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.supervisor.likely_machines import as_heard, chance_of, fits, may_be
 from lathe_chatter.supervisor.move_search import (
+    MOST_ODD,
+    ODD,
     Limits,
-    as_heard,
-    chance_of,
     change_words,
     expectation,
-    fits,
-    may_be,
     moves_for,
 )
+from lathe_chatter.supervisor.vibration import SETTLING, VibrationHistory
 
-_SETTLING, _LONGEST = 0.5, 2.0
-"""s from a move to the judgement whether the vibration falls, and from that to the next."""
-_AGAIN = 1.0
-"""s after which it looks for a move again, where it could not make one."""
+_LONGEST = 2.0
+"""s from a move to the judgement whether the vibration falls, at most."""
+_AGAIN = 2.0
+"""s after which it looks for a move again, where it could not make one: that takes up to one."""
 _EFOLDS = 1.5
 """Of the predicted decay, before that judgement."""
-_FALLING, _FALLEN = 0.9, 0.5
-"""Part to which vibration falls meanwhile where chatter dies; and of what it was at the move, to
-which it has fallen where it falls no more."""
 _GROWN, _GROWING, _UNEXPECTED = 4.0, 2.2, 8.0
 """Times the vibration of the quiet cut before, that it has whatever is known of its growth; where
 it is known to grow; and where most machines that it may be are stable. Else the flag is waited
 on, for noise raises it at times."""
-_SURELY = 0.1
-"""s that it must have had that, and not fallen: what a change of the cut stirs up falls soon."""
-_LOOKS = 200
-"""At a quiet cut, that tell its vibration."""
-_BEYOND = 0.2
-"""s that vibration must be beyond its limit, and not fall, for a stop."""
+_EARLY = 0.1
+"""s after a flag in which it is heard whether it fits the machine."""
+_NEAR = 0.25
+"""Part of the amplitude limit beyond which growing vibration is not waited on."""
 _STEP, _LONGEST_STEP = 0.02, 0.08
 """s from one speed of a ramp to the next, and that count at most."""
 _LASTING = 1.0
@@ -50,7 +43,10 @@ _SAME = 0.01
 _SURER = 0.3
 """Part of the error of the machine that is left where what is heard is what it predicts."""
 _DOUBT, _MOST_DOUBT = 1.25, 2.0
-"""Times its C w that a cut is taken to have after every move that was no cure, and at most."""
+"""Times the reserve that a move has to have after every one that was no cure, and at most."""
+_LASTING_FLAG, _EXPECTED_FLAG, _EXPECTED = 1.0, 2.0, 0.2
+"""s that a flag must last to be believed of a steady vibration whatever it was before; and of any
+where so small a part of the machines is stable: a clearance keeps some chatter small."""
 
 
 ASKS = '~/accept does it'
@@ -110,7 +106,7 @@ class Action:
     sentence: str = ''
     changes: Mapping[str, float] = field(default_factory=dict)
     stop: bool = False
-    settling: float = _SETTLING
+    settling: float = SETTLING
 
 
 class Supervisor:
@@ -145,8 +141,7 @@ class Supervisor:
         self._margin_limit, self._move_early, self._hands_off = margin_limit, move_early, hands_off
         self._hand_at = -math.inf
         self._has_seen_quiet = False
-        self._levels: deque[tuple[float, float]] = deque()
-        self._quiet_levels: deque[float] = deque(maxlen=_LOOKS)
+        self._vibration = VibrationHistory()
         self._safe_since = math.nan
         self._warned, self._doubt = False, 1.0
         self._forget()
@@ -161,7 +156,7 @@ class Supervisor:
         self._offer: tuple[Cut, Action] | None = None
         self._target = math.nan  # of a ramp under way
         self._next_step = self._judge_at = -math.inf
-        self._at_move, self._settling = math.nan, _SETTLING
+        self._at_move, self._settling = math.nan, SETTLING
         self._refusal = self._said = ''
 
     def hand_moved(self, time: float) -> Action | None:
@@ -191,9 +186,7 @@ class Supervisor:
 
     def look(self, seen: Seen) -> Action | None:
         """What is to be said or done now; to be called some fifty times a second."""
-        self._levels.append((seen.time, seen.amplitude))
-        while self._levels[0][0] < seen.time - _SETTLING:
-            self._levels.popleft()
+        self._vibration.note(seen.time, seen.amplitude)
         if math.isfinite(self._target):
             return self._go_on(seen)
         if seen.chatter:
@@ -210,13 +203,13 @@ class Supervisor:
         if hindrance := self._hindrance(seen):
             self._offer = None
             return self._once(f'{_figures(seen)}: nothing is done, for {hindrance}.')
-        if self._is_beyond(seen):
+        if self._vibration.is_beyond(self.limits.amplitude_limit):
             limit = f'beyond amplitude_limit, {1e6 * self.limits.amplitude_limit:.0f} um'
             return self._decide(seen, Action(f'{_figures(seen)}, {limit}: {{}} stop', stop=True))
         if seen.time < self._judge_at or self._offer is not None:
             return None
-        if self.moves and self._dies(seen):
-            self._judge_at = seen.time + _SETTLING
+        if self.moves and self._vibration.dies(self._at_move, seen.growth_rate):
+            self._judge_at = seen.time + SETTLING
             return None
         if not (self.moves or self._is_sure(seen)):
             return None
@@ -230,21 +223,21 @@ class Supervisor:
         if self.moves > self._doubted:  # the machine is not as it was told
             self._doubted = self.moves
             self._doubt = min(_DOUBT * self._doubt, _MOST_DOUBT)
-        coefficient = self._doubt * machine.cutting_coefficient
-        machine = replace(machine, cutting_coefficient=coefficient)
         amplitude = seen.amplitude if math.isfinite(seen.amplitude) else 0.0
         self._judge_at = seen.time + _AGAIN
-        errors = (self._machine_error, _SURER * self._machine_error)[: 1 + self._fits]
+        sure, surer = self._machine_error, _SURER * self._machine_error
+        tries = [(sure, ODD), *([(surer, ODD)] if self._fits else []), (sure, MOST_ODD)]
         found = (
-            moves_for(may_be(machine, error), seen.cut, self.limits, amplitude) for error in errors
+            moves_for(may_be(machine, error), seen.cut, self.limits, amplitude, self._doubt, odd)
+            for error, odd in tries
         )
         for move in chain.from_iterable(found):
             if not any(_same(move.cut, cut) for cut in (seen.cut, *self._tried)):
                 changes = move.changes_from(seen.cut)
                 said = f'{why}: {{}} set {change_words(changes, seen.cut)} ({expectation(move)})'
-                settling = min(_SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
+                settling = min(SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
                 return self._decide(seen, Action(said, changes, settling=settling), move.cut)
-        nothing = 'no cut within the limits is predicted to be stable, and none was left to try'
+        nothing = 'no move within the limits is predicted to help, and none was left to try'
         return self._once(f'{why}: {nothing}; a person has to decide.')
 
     def _decide(self, seen: Seen, action: Action, cut: Cut | None = None) -> Action | None:
@@ -310,12 +303,6 @@ class Supervisor:
             return 'the amplitude is not known'
         return ''
 
-    def _dies(self, seen: Seen) -> bool:
-        """Whether the vibration falls, or has fallen since the move and grows no more."""
-        if seen.amplitude < _FALLING * self._levels[0][1]:
-            return True
-        return seen.amplitude < _FALLEN * self._at_move and not seen.growth_rate > 0.0
-
     def _is_sure(self, seen: Seen) -> bool:
         """Whether the vibration is more than noise; so where no quiet cut was seen before."""
         if self.machine is None:
@@ -323,22 +310,17 @@ class Supervisor:
         if self._chance is None or self._chance[0] != seen.cut:
             machines = may_be(self.machine, self._machine_error)
             self._chance = seen.cut, chance_of(machines, seen.cut)
-        if seen.time < self._alarm_at + _SURELY:
+        flagged_for, grows = seen.time - self._alarm_at, seen.growth_rate > 0.0
+        if flagged_for < _EARLY:
             # Before it has grown so far that the tool leaves the cut.
             self._fits |= fits(self.machine, seen.cut, seen.frequency, seen.growth_rate)
-            return False
-        recent = [level for time, level in self._levels if time > seen.time - _SURELY]
-        times = _GROWING if seen.growth_rate > 0.0 else _GROWN
-        times = _UNEXPECTED if self._chance[1] > 0.5 else times
-        enough = not self._quiet_levels or min(recent) > times * median(self._quiet_levels)
-        return enough and seen.amplitude > _FALLING * recent[0]
-
-    def _is_beyond(self, seen: Seen) -> bool:
-        """Whether the vibration is beyond its limit, and stays there."""
-        recent = [level for time, level in self._levels if time > seen.time - _BEYOND]
-        lasting = self._levels[0][0] <= seen.time - _BEYOND
-        beyond = lasting and min(recent) > self.limits.amplitude_limit
-        return beyond and seen.amplitude > _FALLING * recent[0]
+            return grows and seen.amplitude > _NEAR * self.limits.amplitude_limit
+        if flagged_for > _LASTING_FLAG and self._vibration.is_steady():
+            return True
+        if flagged_for > _EXPECTED_FLAG and self._chance[1] < _EXPECTED:
+            return True
+        times = _GROWING if grows else _GROWN
+        return self._vibration.stands_out(_UNEXPECTED if self._chance[1] > 0.5 else times)
 
     # -- no chatter --------------------------------------------------------------------------
 
@@ -353,8 +335,7 @@ class Supervisor:
             word = 'move' if moves == 1 else 'moves'
             return Action(f'The chatter has ended{when}; {moves} {word}.')
         self._has_seen_quiet = True
-        if math.isfinite(seen.amplitude):
-            self._quiet_levels.append(seen.amplitude)
+        self._vibration.note_quiet()
         if not seen.margin < self._margin_limit:
             self._safe_since = math.nan
             self._warned &= not seen.margin > 1.5 * self._margin_limit
@@ -389,9 +370,11 @@ def _same(one: Cut, other: Cut) -> bool:
 
 
 def _figures(seen: Seen) -> str:
+    # Of small vibration: large vibration may last where that is negative.
+    growth = 'growing at' if seen.growth_rate > 0.0 else 'growth rate'
     known = [
         (seen.frequency, f'at {seen.frequency:.1f} Hz'),
-        (seen.growth_rate, f'growing at {seen.growth_rate:.1f} 1/s'),
+        (seen.growth_rate, f'{growth} {seen.growth_rate:.1f} 1/s'),
         (seen.amplitude, f'amplitude {1e6 * seen.amplitude:.3g} um'),
     ]
     words = [text for value, text in known if math.isfinite(value)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -138,6 +140,14 @@ def test_where_nothing_helps_a_person_has_to_decide() -> None:
     assert 'a person has to decide' in there.said[0]
 
 
+@pytest.mark.parametrize(('rate', 'words'), [(4.0, 'growing at 4.0'), (-4.0, 'growth rate -4.0')])
+def test_what_does_not_grow_is_not_said_to_grow(rate: float, words: str) -> None:
+    supervisor = Supervisor(Limits())
+    action = supervisor.look(Seen(1.0, CALM, chatter=True, growth_rate=rate, amplitude=1e-5))
+    assert action is not None
+    assert f'Chatter {words} 1/s, amplitude 10 um' in action.sentence
+
+
 def test_hands_off_while_somebody_else_acts() -> None:
     there = SupervisedLathe(CALM)
     there.run(0.5)
@@ -155,6 +165,39 @@ def looks(supervisor: Supervisor, **values: float | bool) -> list[str]:
     supervisor.machine = Machine()
     seen = [Seen(0.02 * k, CALM, **values) for k in range(150)]  # type: ignore[arg-type]
     return [action.sentence for each in seen if (action := supervisor.look(each)) is not None]
+
+
+def first_move(cut: Cut, amplitude: Callable[[float], float], growth_rate: float) -> float:
+    """When it moves after a flag that comes at 0 s, s; infinite where it waits for 4 s."""
+    supervisor = Supervisor(Limits(), Mode.ACT)
+    supervisor.machine = Machine()
+    for k in range(-100, 200):
+        time = 0.02 * k
+        seen = Seen(time, cut, k >= 0, growth_rate, 130.0, amplitude(time))
+        action = supervisor.look(seen)
+        if action is not None and action.changes:
+            return time
+    return math.inf
+
+
+def unsteady(time: float) -> float:
+    return 1e-6 * (1.0 + 0.5 * math.sin(9.0 * time))
+
+
+def test_chatter_that_had_grown_before_its_flag_is_believed_once_it_is_steady() -> None:
+    stable = CALM.with_changes(depth_of_cut=6.4e-4)  # as the machine is told
+    assert 0.9 < first_move(stable, lambda _time: 5e-5, 0.0) < 1.2
+    assert first_move(stable, unsteady, 0.0) == math.inf
+
+
+def test_chatter_that_stays_small_is_believed_in_a_cut_that_is_expected_to_chatter() -> None:
+    assert 1.9 < first_move(CALM.with_changes(depth_of_cut=DEEP), unsteady, 0.0) < 2.5
+
+
+def test_vibration_that_grows_near_its_limit_is_not_waited_on() -> None:
+    deep = CALM.with_changes(depth_of_cut=DEEP)
+    assert first_move(deep, lambda time: 2e-4 * math.exp(5.0 * min(time, 0.0)), 5.0) == 0.0
+    assert first_move(deep, lambda time: 2e-4 * math.exp(5.0 * min(time, 0.0)), -5.0) > 0.0
 
 
 def test_a_small_margin_is_warned_of_once() -> None:
