@@ -243,7 +243,9 @@ def _saturated(
 
 
 @compiled(borrows=True, inner=True)
-def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: float) -> None:
+def _decide(
+    state: DetectorState, strongest_amplitude: float, recent_amplitude: float, by_itself: bool
+) -> None:
     """Raise the alarm, or clear it."""
     now = state.now[0]
     alarm = now.score >= now.strictness or now.saturated >= _SATURATED
@@ -254,6 +256,8 @@ def _decide(state: DetectorState, strongest_amplitude: float, recent_amplitude: 
         if now.suspected >= 1:
             now.alarmed, now.since_alarm, now.calm = 1, 0, 0
             now.peak_amplitude = strongest_amplitude
+            if by_itself and now.score < now.strictness:
+                restart_baseline(state)  # it holds the chatter already
         return
     now.since_alarm += 1
     # A knock is no peak: it has died out within some hops.
@@ -292,11 +296,14 @@ def judge(
     newest, period = now.newest, settings.period
     model = settings.has_machine != 0 and settings.believed != REJECTED
     follow_speed(state, speed, 1.0 / max(speed * period, 1e-9))
-    strongest = follow_energy(state, newest)
+    strongest = steadiest = follow_energy(state, newest)
+    by_itself = settings.has_machine == 0 and now.strictness < np.inf
     # Without a baseline the growth rate would be alone, and what dies down into noise has any.
     unchecked = model and (settings.believed == UNCHECKED or now.rise != now.rise)
     if settings.has_machine == 0:
         loudest = follow_lines(state, newest)
+        if by_itself:  # chatter that the baseline holds has risen no more than anything else
+            steadiest = loudest
         if now.by_line != 0 or now.rise != now.rise:
             strongest = loudest
         now.strongest = strongest
@@ -352,11 +359,11 @@ def judge(
     # Where the cut grows, by the machine, a shorter time says enough.
     length = _SHORT if model and _grows(identified) else HOPS
     if now.alarmed == 0 and now.ramping == 0 and speed > 0.0 and now.hops_seen >= length:
-        steady = _saturated(state, products, newest, strongest, stiff, length)
+        steady = _saturated(state, products, newest, steadiest, stiff, length)
         # Roundings are steady too.
         steady = steady and amplitude > now.smallest_amplitude
         now.saturated = now.saturated + 1 if steady else 0
-    _decide(state, amplitude, recent)
+    _decide(state, amplitude, recent, by_itself)
     write_figures(state, windows, wave, model, amplitude)
     cutting = is_cutting(now, windows[WINDOWS.size - 1], products, settings)
     now.state = state_of(state, cutting, forced)

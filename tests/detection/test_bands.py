@@ -15,6 +15,7 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model import Mode as Vibration
+from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.stability import critical_depth, rightmost_root
 
 MASS = {50.0: 400.0, 400.0: 20.0, 1500.0: 1.0}
@@ -52,6 +53,23 @@ def test_chatter_of_any_frequency_is_found_at_it(hertz: float, rate: float) -> N
     later = found[min(flag + 5, 349)]
     assert later.mode is Mode.NO_MACHINE
     assert later.frequency == pytest.approx(root.imag / 2.0 / math.pi, rel=0.01)
+
+
+@pytest.mark.parametrize(('depth', 'is_chatter'), [(0.5e-3, True), (0.25e-3, False)])
+def test_chatter_that_noise_has_raised_at_once_is_found(depth: float, is_chatter: bool) -> None:
+    """It is full grown before there is any baseline, and noise rises above that as much as it."""
+    described = load_machine('chucked_shaft')
+    cut = described.cut.with_changes(depth_of_cut=depth, force_noise=0.5)
+    lathe, detector = VirtualLathe(described.machine, cut=cut), ChatterDetector(None)
+    found = [detector.update(lathe.advance(200), lathe.columns) for _ in range(300)]
+    assert any(each.chatter for each in found) is is_chatter
+    if is_chatter:
+        flag = next(k for k in range(300) if found[k].chatter)
+        assert flag < 150
+        assert all(each.chatter for each in found[flag:])
+        assert np.median([each.frequency for each in found[flag:]]) == pytest.approx(
+            317.0, abs=1.0
+        )
 
 
 def test_nothing_is_looked_for_beyond_what_the_rate_can_tell() -> None:
