@@ -27,8 +27,10 @@ _ONSET = 8
 """Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
 _CUTS, _PUSHED = 4.0, 32
 """Standard errors from which on a force is one, and hops over which its mean is taken."""
-_NO_PUSH = 0.25
-"""Of the largest mean push that there was: less is none."""
+_NO_PUSH, _DOUBT = 0.25, 2.0
+"""Of the mean push that there was: less is none; standard errors by which it has to be less."""
+_FORGOTTEN = 0.94
+"""Of a larger push, per hop: what falls more slowly is the drift of a sensor, no end of a cut."""
 _HEARD, _SURE, _NEXT_TO_NOTHING = 0.15, 3.0, 0.005
 """Part of the signal that is no noise; standard errors; C w over the stiffness of the tool."""
 
@@ -49,11 +51,13 @@ def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
     # Neighbours vibrate together: the mean of 32 is about as sure as that of 8.
     error = math.sqrt(max(squares - mean**2, 0.0) / (_PUSHED / 4.0))
     if abs(mean) > _CUTS * error:
-        now.push = max(now.push, abs(mean))
+        now.push = max(_FORGOTTEN * now.push, abs(mean))
+        return True
+    if settings.has_machine != 0 and known.cutting > _CUTS * known.cutting_error:
         return True
     if now.push > 0.0:
-        return bool(abs(mean) + error > _NO_PUSH * now.push)
-    if settings.has_machine == 0 or known.cutting > _CUTS * known.cutting_error:
+        return bool(abs(mean) + _DOUBT * error > _NO_PUSH * now.push)
+    if settings.has_machine == 0:
         return True
     heard = known.clearness > _HEARD
     most = known.cutting + _SURE * known.cutting_error

@@ -142,6 +142,23 @@ def test_a_machine_at_rest_or_without_a_cut_is_idle() -> None:
     assert _watch(ChatterDetector(), still)[-1].state == 'idle'
 
 
+@pytest.mark.parametrize('rate', [3e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize('machine', [Machine(), None])
+def test_a_sensor_that_drifts_through_zero_makes_no_cut_idle(
+    rate: float, machine: Machine | None
+) -> None:
+    """The tool is pushed aside by -1.9 um, which the drift takes away; what is cut, is cut."""
+    samples = _seconds(VirtualLathe(cut=_cut()), 3.0 + 3e-6 / rate)
+    samples[:, _TOOL] += rate * np.maximum(samples[:, 0] - 3.0, 0.0)
+    assert 'idle' not in {each.state for each in _watch(ChatterDetector(machine), samples)}
+
+
+@pytest.mark.parametrize('change', [{'depth_of_cut': 0.0}, {'feed_speed': 0.0}])
+def test_a_noisy_cut_that_ends_is_idle(change: dict[str, float]) -> None:
+    samples = _play([(6.0, change)])
+    assert _watch(ChatterDetector(), samples)[-1].state == 'idle'
+
+
 def test_vibration_that_is_the_spindles_own_is_forced() -> None:
     """A runout large enough to be told, of a stable cut: once per turn it repeats."""
     seen = _watch(ChatterDetector(), _seconds(VirtualLathe(cut=_cut(runout=1e-4)), 4.0))
