@@ -151,7 +151,9 @@ class ChatterDetector:
         if speed_range is not None:
             self._speed_range = speed_range
             for adviser in self._advisers:
-                adviser.speed_range = speed_range
+                adviser.keep_to(speed_range)
+            if (request := self._estimate.request) is not None:
+                self._estimate = replace(self._estimate, request=request.within(speed_range))
         self._told = machine
         self._machine = machine if _has_plain_modes(machine) else None
         self._correction: tuple[float, float] | None = None

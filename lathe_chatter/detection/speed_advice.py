@@ -107,7 +107,10 @@ class Advice:
             if math.isfinite(best.growth_rate):
                 expected = f' (growth rate {best.growth_rate:.1f} 1/s'
                 if math.isfinite(best.width):
-                    expected += f', stable within +-{50.0 * best.width:.1f} %'
+                    # Where none of the speeds that are tried around it is stable: their step.
+                    tolerance = 50.0 * best.width or 200.0 * _AROUND / (_TRIED - 1)
+                    less = '' if best.width else 'less than '
+                    expected += f', stable within {less}+-{tolerance:.1f} %'
                 expected += ')'
             if math.isfinite(best.probability):
                 chance = f'stable in {10.0 * best.probability:.0f} of 10 cases'

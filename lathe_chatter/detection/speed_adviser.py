@@ -64,6 +64,11 @@ class AdviceRequest:
     machine: Machine | None
     speed_range: tuple[float, float]
 
+    def within(self, speed_range: tuple[float, float]) -> AdviceRequest:
+        """The same with another range of speeds: itself, with its answer, where it is the same."""
+        same = speed_range == self.speed_range
+        return self if same else replace(self, speed_range=speed_range)
+
     @cached_property
     def answer(self) -> Advice:
         """What to do, some 10 ms after it is asked for first."""
@@ -116,6 +121,16 @@ class SpeedAdviser:
         self.machine = machine
         self._error = math.inf
         self._surely_grew = -math.inf
+
+    def keep_to(self, speed_range: tuple[float, float]) -> None:
+        """Recommend no other speeds; for what chatters already another one is found, if need be.
+
+        Args:
+            speed_range: As for the constructor.
+        """
+        self.speed_range = speed_range
+        if self.request is not None:
+            self.request = self.request.within(speed_range)
 
     def is_due(self, hops_after_alarm: int) -> bool:
         """Whether a speed is to be recommended now."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
@@ -106,7 +107,7 @@ class MonitorNode(ParameterNode):
         self._figures: Mapping[str, float] = {}
         self._details: Mapping[str, object] = {}
         self._next_report = -math.inf
-        self._reported = _Reported(-math.inf, 0)
+        self._reported_at, self._reported_lost = -math.inf, 0
 
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
         self._state_publisher = self._publisher(String, 'state', _LATCHED)
@@ -153,7 +154,14 @@ class MonitorNode(ParameterNode):
             self._complain(error)
             return
         self._complaint = ''
+        # The spindle of a machine that is yet to be told may not have the speed.
+        if estimate.request is not None and self._awaits_machine():
+            estimate = replace(estimate, request=None)
         self._publish(estimate)
+
+    def _awaits_machine(self) -> bool:
+        asked = self._asked
+        return asked is not None and asked.is_awaited(self._subscription.publishers())
 
     def _complain(self, error: LatheChatterError) -> None:
         self._complaint = str(error)
@@ -334,7 +342,7 @@ class MonitorNode(ParameterNode):
             self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')
         if self._asked is not None and not self._asked.answered:
             self._asked.ask()
-        silent = self._heard_at == self._reported.heard_at
+        silent = self._heard_at == self._reported_at
         if silent and self._senders:
             self._senders, self._continuity.last = [], None
         elif silent and not self._silent and self._continuity.last is not None:
@@ -345,7 +353,7 @@ class MonitorNode(ParameterNode):
             self._silent = False
             self._subscription.remember_publishers()
         self._diagnostics.publish(self._statuses(silent=silent))
-        self._reported = _Reported(self._heard_at, self._continuity.lost)
+        self._reported_at, self._reported_lost = self._heard_at, self._continuity.lost
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
         since = {'flag since, s': self._flag_since} if self._flag_since > -math.inf else {}
@@ -375,16 +383,9 @@ class MonitorNode(ParameterNode):
             return Status('samples', WARN, 'no samples come', values)
         if self._faults:
             return Status('samples', WARN, ', '.join(self._faults), values)
-        if heard.lost > self._reported.lost:
+        if heard.lost > self._reported_lost:
             return Status('samples', WARN, 'samples were lost', values)
         return Status('samples', OK, 'all samples came', values)
-
-
-class _Reported(NamedTuple):
-    """When samples had come, and how many were lost, at the last report."""
-
-    heard_at: float
-    lost: int
 
 
 def main() -> None:

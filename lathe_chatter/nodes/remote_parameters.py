@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -28,6 +29,8 @@ _UNKNOWN = '_UNKNOWN_'
 """In the name of a node of which the graph has a publisher before it has the name."""
 _PATIENCE = 1.0
 """s after which an unanswered node is asked again: on a busy machine answers may be lost."""
+_LONGEST_WAIT = 30.0
+"""s for which an answer is awaited where something depends on it."""
 _MACHINE = [MACHINE_FILE.name, *(row.name for row in MACHINE_ROWS)]
 
 OnMachine = Callable[[Machine, MachineDescription | None], None]
@@ -157,7 +160,23 @@ class RemoteMachine:
         """Nothing is asked yet."""
         self._node, self._on_machine = node, on_machine
         self._parameters = RemoteParameters(node, self._take)
+        service = node.resolve_service_name('lathe/get_parameters')
+        self._lathe = service.removesuffix('/get_parameters')
         self.answered = False
+        self._awaited_since = math.inf
+
+    def is_awaited(self, publishers: Sequence[str]) -> bool:
+        """Whether the lathe is one of these nodes, and has yet to answer.
+
+        Args:
+            publishers: Full names; of one that is not known yet, it may be the lathe.
+        """
+        there = any(name == self._lathe or _UNKNOWN in name.upper() for name in publishers)
+        if self.answered or not there:
+            return False
+        now = time.monotonic()
+        self._awaited_since = min(self._awaited_since, now)
+        return now - self._awaited_since < _LONGEST_WAIT
 
     def ask(self) -> None:
         """Ask, if there is somebody to ask; called again and again until it is answered."""
@@ -167,6 +186,7 @@ class RemoteMachine:
         self._parameters.look()
 
     def _take(self, _name: str, values: dict[str, Any]) -> None:
+        self._awaited_since = -math.inf  # whatever it says
         known = {name: value for name, value in values.items() if value is not None}
         described = bool(known.get(MACHINE_FILE.name))
         lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in known]
@@ -178,7 +198,7 @@ class RemoteMachine:
             if lacking:
                 self._complain(f'it has no parameter {lacking[0]}.')
                 return
-            self.answered = True
+            self.answered, self._awaited_since = True, math.inf
             self._on_machine(machine, file)
 
     def _complain(self, reason: str) -> None:

@@ -55,6 +55,16 @@ def test_where_no_speed_is_stable_the_depth_is_reduced_no_more_than_it_must(seed
     )
 
 
+def test_of_a_speed_without_stable_ones_around_it_the_width_is_told_as_less_than_was_tried() -> (
+    None
+):
+    words = [Advice((AdvisedSpeed(2785.0, -2.5, width),)).in_words() for width in (0.0, 0.01)]
+    assert words == [
+        'try 2785 rev/min (growth rate -2.5 1/s, stable within less than +-0.5 %)',
+        'try 2785 rev/min (growth rate -2.5 1/s, stable within +-0.5 %)',
+    ]
+
+
 def test_the_rule_of_thumb_puts_whole_waves_on_a_turn() -> None:
     speeds = [speed.spindle_speed_rpm for speed in rule_of_thumb(130.0, _RANGE).speeds]
     assert speeds == pytest.approx([7800.0, 3900.0, 2600.0])

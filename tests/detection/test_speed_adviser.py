@@ -120,3 +120,15 @@ def test_a_machine_that_is_told_amid_chatter_gives_advice_in_place_of_the_rule(
     best = seen[-1].advice.speeds[0]
     assert math.isnan(best.probability)  # no rule of thumb any more
     assert _growth(Machine(), best.spindle_speed_rpm, 0.8e-3) < 0.0
+
+
+def test_a_range_of_speeds_that_is_told_amid_chatter_holds_at_once() -> None:
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=0.8e-3, **_OPEN))
+    detector = ChatterDetector(None)
+    while not _watch(detector, lathe, 0.01)[-1].recommended_speed_rpm > 3000.0:
+        assert lathe.time < 10.0
+    detector.set_machine(None, (1000.0, 3000.0))
+    seen = _watch(detector, lathe, 0.5)
+    speeds = [estimate.recommended_speed_rpm for estimate in seen]
+    assert any(speed > 0.0 for speed in speeds)
+    assert not any(speed > 3000.0 for speed in speeds)

@@ -80,6 +80,25 @@ def test_nobody_recommends_or_goes_to_a_speed_that_the_spindle_has_not(
     assert reports.sentences('lathe').count(doubt) == 2
 
 
+def test_no_speed_is_recommended_before_the_lathe_has_told_its_machine(
+    bench: Bench, nodes: NodeProcesses
+) -> None:
+    """A cut that chatters from the start is flagged before a lathe can answer."""
+    file = nodes.folder / 'spindle.yaml'
+    file.write_text(SPINDLE)
+    reports = Reports(bench)
+    flags = bench.listen_first(Bool, '/chatter_monitor/chatter', LATCHED)
+    speeds = bench.listen_first(Float64, '/chatter_monitor/recommended_speed_rpm')
+    nodes.start('chatter_monitor')
+    nodes.start('lathe', f'machine:={file}', 'force_noise:=0.5', 'await_readers:=1')
+    bench.spin_until(lambda: flags and flags[-1].data and speeds, 'chatter and advice')
+    assert all(300.0 <= speed.data <= 4000.0 for speed in speeds)
+    said = reports.sentences('chatter_monitor')
+    told = next(number for number, each in enumerate(said) if 'has told what machine' in each)
+    assert not [each for each in said[:told] if 'rule of thumb' in each]
+    assert [each for each in said[told:] if 'rev/min' in each]
+
+
 def test_a_feed_speed_that_does_not_rule_is_refused_and_a_dump_is_taken(
     bench: Bench, nodes: NodeProcesses
 ) -> None:
