@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from contextlib import suppress
@@ -72,8 +73,10 @@ def configure(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Play the scenario; 0 if the monitor said what the scenario expects, else 1.
 
+    A run that fails is reported up to then; 1 too, where the scenario is not to blame.
+
     Raises:
-        LatheChatterError: If it failed; what was recorded until then is reported before.
+        LatheChatterError: If it did not begin, or the lathe refused what the scenario asked.
     """
     file = utf8('--scenario', find_scenario(options.scenario))
     scenario = _scenario(file, options)
@@ -87,12 +90,16 @@ def run(options: Namespace) -> int:
     screen.compile()
     try:
         interrupted = play(scenario, file, output, screen, page=options.page)
-    except (NodeFailedError, RunFailedError, ScenarioFailedError):
-        if _has_samples(output):
-            screen.say('It has failed: the run is reported up to then ...')
-            with suppress(RunReadError):
-                screen.json(show_run(read_history(output), screen))
-        raise
+    except (NodeFailedError, RunFailedError, ScenarioFailedError) as error:
+        if not _has_samples(output):
+            raise
+        screen.say('It has failed: the run is reported up to then ...')
+        with suppress(RunReadError):
+            screen.json(show_run(read_history(output), screen))
+        if isinstance(error, ScenarioFailedError):
+            raise  # a mistake in what was asked
+        sys.stderr.write(f'lathe-chatter run: {error}\n')
+        return 1
     if interrupted and not _has_samples(output):
         shutil.rmtree(output, ignore_errors=True)  # else it would pass for a run
         screen.say('Interrupted while the nodes were still starting: nothing was recorded.')
