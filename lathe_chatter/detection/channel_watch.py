@@ -32,6 +32,8 @@ _PACES = 32.0
 _RAIL, _RAIL_RUN, _RAIL_HITS, _RAIL_STEPS = 1.0, 3, 4, 4.0
 """s between meetings of a rail, samples spent at it, meetings, smallest steps it is met with."""
 _CAUSES = ('is not a number', 'stands still', 'is cut off at a limit of its range')
+_BITS = len(_CAUSES).bit_length()
+"""Of the number of a cause, from 1 on; 0 is none."""
 _NEVER = -1e300
 
 
@@ -54,7 +56,8 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
     """
     if not causes:
         return ()
-    found = ((name, (causes >> 2 * number) & 3) for number, name in enumerate(names))
+    numbers = (causes >> _BITS * place & (1 << _BITS) - 1 for place in range(len(names)))
+    found = zip(names, numbers, strict=True)
     return tuple(f'{name} {_CAUSES[cause - 1]}' for name, cause in found if name and cause)
 
 
@@ -81,9 +84,9 @@ def _causes(channels: Records, time: float) -> int:
     for number in range(3):
         channel = channels[number]
         if time - channel.bad_at < _AFTERWARDS:
-            causes += (1 + (channel.stood_still != 0)) << 2 * number
+            causes += (1 + (channel.stood_still != 0)) << _BITS * number
         elif time - channel.rail_at < _RAIL:
-            causes += 3 << 2 * number
+            causes += 3 << _BITS * number
     return causes
 
 
@@ -97,8 +100,8 @@ def watch_channels(rows: Array, channels: Records) -> int:
         channels: From `new_channels`, changed in place.
 
     Returns:
-        What is wrong after the last row: two bits for each channel, the lowest for the first; 0
-        for nothing, else the number of a cause, from 1 on.
+        What is wrong after the last row: `_BITS` bits for each channel, the lowest for the first:
+        0 for nothing, else the number of a cause, from 1 on.
     """
     for i in range(rows.shape[0]):
         time, well = rows[i, 0], 0.0
