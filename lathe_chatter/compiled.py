@@ -3,7 +3,8 @@
 Numba keeps the machine code of a function until the function's own file changes. But a function
 holds the code of those that it calls, from other files too: after an update of one of them the
 stale code of its callers would be run, and give other numbers. So the code of a package is kept
-in a folder named after the content of all its files.
+in a folder named after the content of all its files, and after Numba's version: one throws away
+what another has kept.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 @lru_cache
 def _cache_folder(package: Path) -> str | None:
     """Where the machine code of a package is kept, as its sources are now; None: nowhere."""
-    digest = hashlib.sha256(Path(__file__).read_bytes())
+    digest = hashlib.sha256(numba.__version__.encode() + Path(__file__).read_bytes())
     for file in sorted(package.glob('*.py')):
         digest.update(file.read_bytes())
     name = f'{package.name}-{digest.hexdigest()[:16]}'

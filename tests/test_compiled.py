@@ -8,9 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
-from lathe_chatter.compiled import _bases, compiled
+from lathe_chatter.compiled import _bases, _cache_folder, compiled
 from lathe_chatter.precompile import precompile
 
 WATCH = """
@@ -38,6 +39,18 @@ def test_an_import_makes_no_folder(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / 'new').exists()
+
+
+def test_each_version_of_numba_keeps_its_own_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two environments with one folder each start would compile what the other had kept."""
+    monkeypatch.setattr(numba.config, 'CACHE_DIR', str(tmp_path / 'cache'))
+    folders = set()
+    for version in ('0.59.0', '0.68.1', '0.68.1'):
+        monkeypatch.setattr(numba, '__version__', version)
+        folders.add(_cache_folder.__wrapped__(tmp_path))
+    assert len(folders) == 2
 
 
 def test_a_cache_that_cannot_be_written_is_made_elsewhere(tmp_path: Path) -> None:
