@@ -27,7 +27,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from lathe_chatter.lathe.cut_event_sentences import parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import parse_change
 
 TICK = 0.002
 _IN_TIME = 0.01

@@ -20,7 +20,7 @@ from support.browser import Browser
 from support.page_cell import header_of
 from websockets.sync.client import connect
 
-from lathe_chatter.lathe.cut_event_sentences import parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import parse_change
 from lathe_chatter.page.server import answers, free_port
 
 PAGE = 'operator_page'

@@ -10,7 +10,7 @@ from typing import Any
 
 from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen, counted, writing
-from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
+from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.plot_style import text_of
 from lathe_chatter.report.operating_points import probabilities_of

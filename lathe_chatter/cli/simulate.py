@@ -12,8 +12,8 @@ from lathe_chatter.cli.parameter_options import add_parameter_options, given_par
 from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
 from lathe_chatter.errors import ParameterError, ScenarioError
+from lathe_chatter.lathe.change_and_knock_sentences import Knock
 from lathe_chatter.lathe.config import config_from
-from lathe_chatter.lathe.cut_event_sentences import Knock
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.model.values_with_units import number_in

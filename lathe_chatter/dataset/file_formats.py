@@ -11,7 +11,7 @@ from pathlib import Path
 from lathe_chatter.dataset.plan import Form
 from lathe_chatter.dataset.windows import DrawnRun, Table
 from lathe_chatter.errors import optional
-from lathe_chatter.lathe.cut_event_sentences import Knock
+from lathe_chatter.lathe.change_and_knock_sentences import Knock
 
 ENDINGS = {Form.PARQUET: '.parquet', Form.HDF5: '.h5', Form.ZARR: '.zarr', Form.MCAP: '_runs'}
 Files = dict[str, bytes]

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import yaml
 
+from lathe_chatter.dataset.drawn_value import Distribution, distribution, distributions, values_of
 from lathe_chatter.errors import MachineFileError, ParameterError, PlanError, reason_of
 from lathe_chatter.lathe.config import config_from
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
-from lathe_chatter.model.distribution import Distribution, distribution, distributions, values_of
 from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE, MACHINE_FILE, MACHINE_ROWS
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
 from lathe_chatter.model.parameter_table import Row

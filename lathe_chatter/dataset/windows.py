@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.dataset.drawn_value import Distribution
 from lathe_chatter.dataset.plan import OF_FILE, Plan
 from lathe_chatter.lathe import EventKind
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
-from lathe_chatter.model.distribution import Distribution
 from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE
 from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.samples import sample_columns
 from lathe_chatter.samples.columns import ACCELERATION_COLUMNS
 from lathe_chatter.stability import safe_limit
-from lathe_chatter.stability.batch_roots import operating_points
 from lathe_chatter.stability.characteristic import Complex
+from lathe_chatter.stability.cuts_at_mean_force import operating_points
 
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""

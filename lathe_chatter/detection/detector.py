@@ -7,12 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.band_detector import (
-    ADVISED_LONG_AGO,
-    TO_BE_ADVISED,
-    BandDetector,
-    Thresholds,
-)
 from lathe_chatter.detection.detector_state import UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filter_design import (
@@ -21,6 +15,12 @@ from lathe_chatter.detection.filter_design import (
     Band,
     band_of,
     bands_of,
+)
+from lathe_chatter.detection.one_band_detector import (
+    ADVISED_LONG_AGO,
+    TO_BE_ADVISED,
+    BandDetector,
+    Thresholds,
 )
 from lathe_chatter.detection.signal_framing import Discontinuity, Framer, HopBlock, StreamFormat
 from lathe_chatter.detection.speed_adviser import SPEEDS, SpeedAdviser

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection.band_detector import BandDetector
 from lathe_chatter.detection.detector_state import HOPS
+from lathe_chatter.detection.one_band_detector import BandDetector
 
 _SHARE, _GONE = 0.55, 0.3
 """Part of all power in the line that makes an alarm, and below which it is over."""

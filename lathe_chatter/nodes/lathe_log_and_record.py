@@ -12,13 +12,13 @@ from rclpy.node import Node
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.cut_event_sentences import (
+from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
     change_sentence,
     knock_sentence,
 )
+from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model import Cut
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status

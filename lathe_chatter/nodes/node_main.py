@@ -23,13 +23,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from lathe_chatter.errors import LatheChatterError, StartError
+from lathe_chatter.nodes.command_line_parameters import Members, Own, deal_parameters
 from lathe_chatter.nodes.end_signals import (
     DeferredSignals,
     ignore_end_signals,
     raise_on_end_signals,
 )
 from lathe_chatter.nodes.log_folder import ensure_log_folder
-from lathe_chatter.nodes.parameter_arguments import Members, Own, deal_parameters
 from lathe_chatter.nodes.real_time_loop import LOOK_UP
 
 try:

@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor, parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor, parse_change
 from lathe_chatter.nodes.diagnostics import DiagnosticsListener
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.node_parameters import PAGE

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import ParameterError, UnknownParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
-from lathe_chatter.nodes.parameter_arguments import OF_QOS, OF_RCLPY
+from lathe_chatter.nodes.command_line_parameters import OF_QOS, OF_RCLPY
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 from lathe_chatter.nodes.real_time_loop import RequestLoad
 

@@ -36,8 +36,8 @@ from lathe_chatter.recording.provenance import (
     parameter_values,
 )
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
-from lathe_chatter.recording.recording_tally import RunLog
 from lathe_chatter.recording.ros_messages import LOG_TYPE
+from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.snapshot import SnapshotBuffer
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
+from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
 from lathe_chatter.page.stability_chart import draw_chart

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from lathe_chatter.errors import RunReadError
-from lathe_chatter.recording.metadata import FILE_NAME
+from lathe_chatter.recording.metadata_yaml import FILE_NAME
 
 _NUMBERED = re.compile(r'^(?P<run>.*)_(?P<number>\d+)$')
 _OTHER_FORMATS = {

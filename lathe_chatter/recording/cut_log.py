@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
-from lathe_chatter.lathe.cut_event_sentences import (
+from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
     Change,

@@ -17,7 +17,6 @@ from lathe_chatter.recording.provenance import (
     identity,
     parameter_values,
 )
-from lathe_chatter.recording.recording_tally import RunLog
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
     PARAMETER_EVENT_TYPE,
@@ -26,6 +25,7 @@ from lathe_chatter.recording.ros_messages import (
     parameters_bytes,
     topic_of_type,
 )
+from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
@@ -104,7 +104,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
             self.commit()
 
     def log(self, sentence: str) -> None:
-        """Write what happened to the cut, a sentence of `cut_event_sentences`."""
+        """Write what happened to the cut, a sentence of `change_and_knock_sentences`."""
         logger = self.name.lstrip('/').replace('/', '.')
         self._add('/rosout', log_bytes(logger, sentence, self._stamp()))
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lathe_chatter.recording.atomic_output import atomic_folder
 from lathe_chatter.recording.file_completeness import lost_at_the_end
+from lathe_chatter.recording.folder_or_nothing import atomic_folder
 from lathe_chatter.recording.mcap_chunk_walk import Damage
-from lathe_chatter.recording.metadata import Topic
+from lathe_chatter.recording.metadata_yaml import Topic
 from lathe_chatter.recording.open_chunk import OpenChunk, record_bytes
 from lathe_chatter.recording.provenance import RECOVERED
 from lathe_chatter.recording.recorded_file import Note, RecordedFile, offered_qos

@@ -1,9 +1,9 @@
 """`resimulate`: compute a recorded run again from what it says, and compare every bit.
 
 A run has the parameters of its lathe, and each change of the cut and each knock with its
-simulated time (cut_event_sentences.py). The lathe is deterministic, its noise included; so the
-samples are those that follow from the rest of the record, or somebody has altered the one or the
-other.
+simulated time (change_and_knock_sentences.py). The lathe is deterministic, its noise included; so
+the samples are those that follow from the rest of the record, or somebody has altered the one or
+the other.
 """
 
 from __future__ import annotations

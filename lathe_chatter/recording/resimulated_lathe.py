@@ -10,8 +10,8 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ReplayError
+from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING, Change, Knock
 from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.cut_event_sentences import BEGINNING, Change, Knock
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.recording.cut_log import CutLog, CutSession
 from lathe_chatter.recording.sample_blocks import SampleBlocks

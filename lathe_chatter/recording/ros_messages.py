@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from lathe_chatter.recording.metadata import Topic
+from lathe_chatter.recording.metadata_yaml import Topic
 
 LOG_TYPE = 'rcl_interfaces/msg/Log'
 PARAMETER_EVENT_TYPE = 'rcl_interfaces/msg/ParameterEvent'

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lathe_chatter.recording.metadata import Topic
-from lathe_chatter.recording.recording_tally import RunLog
+from lathe_chatter.recording.metadata_yaml import Topic
+from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 

@@ -16,7 +16,7 @@ from mcap.records import Channel, Schema
 from lathe_chatter.errors import DiskFullError, RunExistsError
 from lathe_chatter.recording.disk_thread import FileSync
 from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
-from lathe_chatter.recording.metadata import (
+from lathe_chatter.recording.metadata_yaml import (
     FileCount,
     Topic,
     describe,

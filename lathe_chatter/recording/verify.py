@@ -19,7 +19,7 @@ from lathe_chatter.recording.file_completeness import (
     check_order,
     noted,
 )
-from lathe_chatter.recording.metadata_check import check_metadata
+from lathe_chatter.recording.metadata_yaml_check import check_metadata
 from lathe_chatter.recording.provenance import (
     PUBLISHERS,
     RECEPTION,

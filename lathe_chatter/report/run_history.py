@@ -17,7 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.lathe.cut_event_sentences import BEGINNING, BEGINNING_AGAIN, Change, Knock
+from lathe_chatter.lathe.change_and_knock_sentences import (
+    BEGINNING,
+    BEGINNING_AGAIN,
+    Change,
+    Knock,
+)
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.lathe.cut_event_sentences import on_the_shop_floor
+from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.plot_style import (
     ALARM,
     ALARM_TEXT,

@@ -14,13 +14,13 @@ from pathlib import Path
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.detection.speed_adviser import speeds_to_recommend
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.config import LatheConfig, config_from
-from lathe_chatter.lathe.cut_event_sentences import (
+from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING,
     Knock,
     change_sentence,
     knock_sentence,
 )
+from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model.lathe_parameter_table import LATHE, described_by
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.recording import LatheRun

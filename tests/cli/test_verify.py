@@ -10,7 +10,7 @@ from support.recorded import number, topic
 
 from lathe_chatter.cli.main import main
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_event_sentences import BEGINNING
+from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter, read_run
 

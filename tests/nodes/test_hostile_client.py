@@ -10,7 +10,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from support.node_bench import Bench, messages_of
 from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
-from lathe_chatter.lathe.cut_event_sentences import parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import parse_change
 
 FLOOD = 10_000
 UNKNOWN_TYPE = 200

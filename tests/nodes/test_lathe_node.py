@@ -25,7 +25,7 @@ from support.node_bench import DEEP, LATCHED, Bench, messages_of, samples_of
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_event_sentences import Change, parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.joint_states import joint_states
 from lathe_chatter.nodes.lathe_diagnostics import FLOOD

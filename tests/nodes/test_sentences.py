@@ -17,7 +17,7 @@ NODES = Path(lathe_chatter.nodes.__file__).parent
 TESTS = Path(__file__).parents[1]
 LATHE, CLOCK = 'nodes/test_lathe_node.py', 'nodes/test_followed_clock.py'
 CONTROL, STANDARD = 'nodes/test_simulation_control.py', 'nodes/test_simulation_services.py'
-ARGUMENTS = 'nodes/test_parameter_arguments.py'
+ARGUMENTS = 'nodes/test_command_line_parameters.py'
 MAIN, MONITOR = 'nodes/test_node_main.py', 'nodes/test_monitor_node.py'
 STATISTICS, GROUP = 'nodes/test_lathe_diagnostics.py', 'nodes/test_node_processes.py'
 
@@ -174,7 +174,7 @@ SAID = {
             f'{MAIN}::test_a_node_explains_itself_and_takes_no_word_that_it_does_not_know',
         ),
     },
-    'parameter_arguments.py': {
+    'command_line_parameters.py': {
         '-p {} reaches nobody: {} here.': (
             'no node of the process has that name; it does not start',
             f'{ARGUMENTS}::test_a_parameter_that_reaches_nobody_keeps_from_starting',

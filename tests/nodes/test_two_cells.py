@@ -11,7 +11,7 @@ from rcl_interfaces.srv import GetParameters
 from support.node_bench import Bench
 from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
-from lathe_chatter.lathe.cut_event_sentences import Change, parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import Change, parse_change
 from lathe_chatter.recording import Run, read_run, verify
 from lathe_chatter.recording.provenance import PARAMETERS
 from lathe_chatter.recording.run_summary import SUMMARY

@@ -8,7 +8,11 @@ from pathlib import Path
 import pytest
 
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_event_sentences import BEGINNING, BEGINNING_AGAIN, change_sentence
+from lathe_chatter.lathe.change_and_knock_sentences import (
+    BEGINNING,
+    BEGINNING_AGAIN,
+    change_sentence,
+)
 from lathe_chatter.model import Cut
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter, read_run, resimulate, verify

@@ -12,13 +12,13 @@ from support.recorded import topic
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.cut_event_sentences import (
+from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
     change_sentence,
     knock_sentence,
 )
+from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, Resimulation, RunWriter, read_run, resimulate

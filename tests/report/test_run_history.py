@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_event_sentences import Change
+from lathe_chatter.lathe.change_and_knock_sentences import Change
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.report.plotted_samples import RunSamples
 from lathe_chatter.report.run_excerpts import excerpts_of

@@ -9,7 +9,7 @@ import pytest
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_event_sentences import Knock
+from lathe_chatter.lathe.change_and_knock_sentences import Knock
 from lathe_chatter.model import Cut
 from lathe_chatter.recording import read_run, resimulate, verify
 from lathe_chatter.report.run_history import read_history

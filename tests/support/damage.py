@@ -11,7 +11,7 @@ import numpy as np
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.cut_event_sentences import BEGINNING, change_sentence
+from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING, change_sentence
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, Run, read_run, recover, verify
 from lathe_chatter.recording.recorded_cuts import recorded_cuts

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import piece_end as at
+from lathe_chatter.lathe.integrator import piece_plan as at
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.first_crossing import NEVER, first_crossing, may_turn_back
 from lathe_chatter.lathe.integrator.propagation import TERMS, WEIGHTS, quintic, solve_piece
@@ -37,7 +37,7 @@ class Machine(NamedTuple):
 class Scratch(NamedTuple):
     """Room to work in, so that no piece has to ask for memory."""
 
-    piece: Array  # by the names of piece_end.py (14,) and more
+    piece: Array  # by the names of piece_plan.py (14,) and more
     end: Array  # coordinates at the end of the piece (2n,)
     other: Array  # coordinates (2n,)
     seen: Array  # what they mean (1, OUTPUTS)

@@ -11,7 +11,7 @@ import math
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator import piece_end as at
+from lathe_chatter.lathe.integrator import piece_plan as at
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import surface
 from lathe_chatter.lathe.integrator.event_in_piece import (
@@ -23,7 +23,7 @@ from lathe_chatter.lathe.integrator.event_in_piece import (
     solve_series,
 )
 from lathe_chatter.lathe.integrator.first_crossing import NEVER
-from lathe_chatter.lathe.integrator.piece_end import by_time, plan_piece
+from lathe_chatter.lathe.integrator.piece_plan import by_time, plan_piece
 from lathe_chatter.lathe.integrator.propagation import coordinates_at, read_outputs
 from lathe_chatter.lathe.integrator.simd_vectors import fma
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
@@ -35,7 +35,7 @@ from lathe_chatter.lathe.integrator.state_layout import (
     WORKPIECE_V,
     WORKPIECE_X,
 )
-from lathe_chatter.lathe.integrator.surface_kinks import bend_of, by_place, finish_corner, lower
+from lathe_chatter.lathe.integrator.surface_corners import bend_of, by_place, finish_corner, lower
 from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 
 _MOST_FLIPS = 32

@@ -5,7 +5,7 @@ contact or cutting. This loop takes such steps in blocks (simd_vectors.py), with
 and a varied speed, and stops before the first that is not; event_step.py then takes that one.
 
 A turn has many more steps than a block, so the surface that a block meets is there before it
-begins; surface_met.py reads it.
+begins; surface_of_block.py reads it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import step_block_layout as at
 from lathe_chatter.lathe.integrator.first_crossing import may_turn_back
 from lathe_chatter.lathe.integrator.output_samples import COLUMNS, add_runout, write_accelerations
-from lathe_chatter.lathe.integrator.piece_end import by_time
+from lathe_chatter.lathe.integrator.piece_plan import by_time
 from lathe_chatter.lathe.integrator.simd_vectors import (
     LANES,
     after,
@@ -37,8 +37,8 @@ from lathe_chatter.lathe.integrator.simd_vectors import (
     turned_on,
 )
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
-from lathe_chatter.lathe.integrator.surface_kinks import bend_of, by_place, finish_corner
-from lathe_chatter.lathe.integrator.surface_met import look_up, nodes_on_grid, surface_on_grid
+from lathe_chatter.lathe.integrator.surface_corners import bend_of, by_place, finish_corner
+from lathe_chatter.lathe.integrator.surface_of_block import look_up, nodes_on_grid, surface_on_grid
 from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lathe_chatter.lathe.cut_event_sentences import change_sentence, parse_change
+from lathe_chatter.lathe.change_and_knock_sentences import change_sentence, parse_change
 from lathe_chatter.model import BearingContact, Cut
 
 OLD = Cut()

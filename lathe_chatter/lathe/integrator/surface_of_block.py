@@ -15,7 +15,7 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator import step_block_layout as at
 from lathe_chatter.lathe.integrator import surface
-from lathe_chatter.lathe.integrator.piece_end import DETAIL
+from lathe_chatter.lathe.integrator.piece_plan import DETAIL
 from lathe_chatter.lathe.integrator.simd_vectors import counted, first_of, fma, lanes_at
 from lathe_chatter.lathe.integrator.spindle import sine_and_cosine, speed_and_slope
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection.baseline import SETTLING
-from lathe_chatter.detection.block_loop import take_hops
 from lathe_chatter.detection.cut_identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
 from lathe_chatter.detection.detector_state import (
     CHATTER,
@@ -23,6 +22,7 @@ from lathe_chatter.detection.detector_state import (
     new_state,
 )
 from lathe_chatter.detection.filter_design import Band, design, gain, pace_of, thinning_of
+from lathe_chatter.detection.hop_loop import take_hops
 from lathe_chatter.detection.machine_check import MachineFit, Verdict
 from lathe_chatter.detection.signal_conditioning import HOP_SUMS, SETTINGS, new_memory
 from lathe_chatter.detection.signal_framing import StreamFormat

@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from lathe_chatter.recording.metadata import FILE_NAME
+from lathe_chatter.recording.metadata_yaml import FILE_NAME
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.verification_result import Verification
 
