@@ -6,9 +6,10 @@ the summary that the commit before it left. The new bytes are always more than t
 replace, so there is no moment between calls at which the file lacks an end: kill -9 loses what
 came since the last commit and nothing else.
 
-A large commit takes milliseconds, in the middle of which a kill may strike: the system leaves off
-between two pages. So the end of the commit before is first copied to where it is in nobody's
-way, beyond the new bytes; the file is cut off behind these when they are all there.
+A large commit takes milliseconds, a small one too where the machine is busy, in the middle of
+which a kill may strike: the system leaves off between two pages. So the end of the commit before
+is first copied to where it is in nobody's way, beyond the new bytes; the file is cut off behind
+these when they are all there.
 
 The package mcap has a writer, but one that makes every summary from nothing, which takes 31 ms
 after half an hour of four commits a second. Here a commit adds to the summary's bytes what is
@@ -50,8 +51,8 @@ _DATA_END_SIZE, _END_SIZE = 13, 37
 _RECORD_HEAD = struct.Struct('<BQ')
 _PRIVATE = 0x80
 """Opcode of records that readers of MCAP pass over."""
-_AT_ONCE = 1 << 17
-"""Bytes that are written within some tens of microseconds."""
+_PAGE = 4096
+"""Bytes of which a kill leaves all or none."""
 
 
 @dataclass
@@ -242,19 +243,22 @@ class CommittedFile:
     def _write(self, data: bytes) -> None:
         """Write over the end of the last commit, so that the file has an end all the while."""
         start, end = self._body_start, self._body_start + len(data)
-        if len(data) < _AT_ONCE or not self._tail:
+        if not self._tail:
             _write_at(self._descriptor, data, start)
             return
         summary = self._tail[_DATA_END_SIZE:-_END_SIZE]
         copy = record_bytes(DataEnd(data_section_crc=0)) + summary
-        far = end + len(copy)
+        beyond = end
+        if (beyond + len(copy)) % _PAGE > _PAGE - _END_SIZE:  # its last bytes would be on two
+            beyond += _END_SIZE
+        far = beyond + len(copy)
         # A few bytes at the far end, which point to the old summary; then a copy of it there.
         _write_at(self._descriptor, _end_after(b'', start + _DATA_END_SIZE, proven=False), far)
-        _write_at(self._descriptor, copy, end)
-        _write_at(self._descriptor, _end_after(summary, end + _DATA_END_SIZE), far)
+        _write_at(self._descriptor, copy, beyond)
+        _write_at(self._descriptor, _end_after(summary, beyond + _DATA_END_SIZE), far)
         # Who walks through the file meets a record that is nobody's business and reaches up to
         # that copy, until all that it covers is there.
-        head = _RECORD_HEAD.pack(_PRIVATE, end - start - _RECORD_HEAD.size)
+        head = _RECORD_HEAD.pack(_PRIVATE, beyond - start - _RECORD_HEAD.size)
         _write_at(self._descriptor, head, start)
         _write_at(self._descriptor, data[len(head) :], start + len(head))
         _write_at(self._descriptor, data[: len(head)], start)
