@@ -204,6 +204,7 @@ class MonitorNode(ParameterNode):
         else:
             again = f'the lathe started again, and I with it from {start} on'
             self._say('restart', f'At {before:.6f} s: {again}.')
+        self._flag_since = math.nan  # a time of the run before is none of this one
         if self._flag:
             self._say('withdrawn', withdrawn(times[0]))
             self._set_flag(times[0], raised=False)

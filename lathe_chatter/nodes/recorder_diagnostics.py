@@ -46,10 +46,9 @@ def recording_status(
         }
     if failure:
         return Status('recording', ERROR, failure, values)
-    complaints = '; '.join(_complaints(topics, log))
-    if complaints:
-        return Status('recording', WARN, complaints, values)
-    return Status('recording', OK, 'recording' if run else 'not recording', values)
+    complaints = [*_complaints(topics, log)]
+    said = '; '.join(['recording' if run else 'not recording', *complaints])
+    return Status('recording', WARN if complaints else OK, said, values)
 
 
 def news(log: RunLog) -> Iterator[str]:

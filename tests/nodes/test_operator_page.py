@@ -111,6 +111,22 @@ def test_a_refusal_is_read_and_the_control_goes_back(browser: Browser) -> None:
     assert value_of(browser, 'depth_of_cut') == before
 
 
+def test_a_cut_that_has_ended_says_so_and_begins_anew(browser: Browser) -> None:
+    operate(browser)
+    browser.enter('#impulse', '1e8')
+    browser.click('#knock')
+    told = browser.until(
+        '/Reset/.test(document.querySelector("#gone").textContent) && '
+        'document.querySelector("#gone").textContent', 'how it goes on'
+    )  # fmt: skip
+    assert 'displacement' in told
+    browser.click('[data-call=reset]')
+    browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
+    browser.until('document.querySelector("#gone").hidden', 'nothing amiss', PATIENCE)
+    assert browser.run('document.querySelector("#lamp-since").textContent') == ''
+    browser.enter('#impulse', '2')
+
+
 def test_pause_step_knock_and_recording(page: Page, browser: Browser) -> None:
     operate(browser)
     browser.click('[data-call=pause]')

@@ -176,6 +176,7 @@ function showAlive() {
   const words = [];
   if (!lathe && !samples) words.push(`${cell.name} is silent: ended, killed or out of reach. What you see is old; the page goes on when it is back.`);
   else if (!samples && !['paused', 'ended'].includes(run)) words.push(`No samples come from ${cell.name}.`);
+  else if (run === 'ended') words.push(`${cell.statuses.lathe.cut?.message ?? 'The cut has ended.'} Reset begins anew.`);
   if (!monitor) words.push('The monitor is silent: nothing is known of chatter.');
   if (!recorder) words.push('No recorder is there.');
   const heard = cell.statuses?.monitor?.samples;
@@ -227,7 +228,7 @@ function showStatuses() {
   const recording = recorder?.recording;
   $('recording').textContent = recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
   showFigures();
-  showLamp();
+  if (cell.alive) showAlive();
 }
 
 function showLog() {
