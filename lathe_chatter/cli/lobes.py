@@ -153,6 +153,8 @@ def run(options: Namespace) -> int:
             config.machine, known, config.cut, config.cut.spindle_speed_rpm,
             tool_leaves_cut=config.setup.tool_leaves_cut,
         )  # fmt: skip
+        sure = float(np.min(probability.safe_depth(SURE))) * 1e3
+        screen.say(f'lowest depth that is safe with {SURE:.0%}: {sure:.4g} mm')
         screen.say(probability_sentence(config.cut, of_cut))
         figures |= _probable_figures(config, probability, of_cut)
     for file in files:

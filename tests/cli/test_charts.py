@@ -196,6 +196,8 @@ def test_a_chart_suits_the_machine(
     if 'cut' in figures:  # the limit of 12.1 mm is inverse to C, which is known to 10 %
         assert 0.6 < figures['cut']['stable_with'] < 0.99
         assert 'At 30 rev/min 11 mm is stable with' in told.err
+        sure = 1e3 * min(json.loads(told.out)['safe_with_95_percent']['depth_of_cut'])
+        assert f'lowest depth that is safe with 95%: {sure:.4g} mm' in told.err
 
 
 def test_knock_map_is_of_the_cut_of_its_machine(

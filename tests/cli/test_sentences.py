@@ -103,6 +103,7 @@ TOLD_ELSEWHERE = {
     ' verdicts agree. Growth rates in 1/s': 'test_reproduce.py',
     'The simulated time went back to zero ': 'recording/test_recorded_cuts.py',
     'stable with ': 'test_charts.py',
+    'lowest depth that is safe with ': 'test_charts.py',
     'Without a spindle speed any line that holds the power is flagged': 'listening/',
     'uncertain there by: ': 'test_charts.py',
     'WARNING  ': 'tap_test, test_charts.py, test_identify.py',

@@ -193,7 +193,7 @@ function showLamp() {
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
   const told = cell.statuses?.monitor?.cut?.values ?? {}, same = told.flag === (flag?.up ? 'True' : 'False');
   const at = flag?.since ?? (same ? told['flag since, s'] : null);
-  const since = known && at != null ? `since ${Number(at).toFixed(2)} s` : '';
+  const since = known && flag.up && at != null ? `since ${Number(at).toFixed(2)} s` : '';
   if ($('lamp-since').textContent !== since) $('lamp-since').textContent = since;
 }
 
@@ -252,6 +252,7 @@ function takeSignals(news, arrays) {
   if (signals && signals.epoch !== news.epoch) {
     envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
     trail = [];
+    document.querySelectorAll('.refusal').forEach(each => { each.textContent = ''; });
   }
   signals = news;
   news.spans.forEach(([first, count, step], k) => {
@@ -338,7 +339,7 @@ function makeControls(rows) {
     const mine = run.filter(row => PRIMARY.includes(row.name) === wanted).sort((a, b) => order(a) - order(b));
     $(id).replaceChildren(...mine.map(row => makeControl(row)));
   }
-  $('fixed').replaceChildren(...rows.filter(row => row.fixed).flatMap(row => {
+  $('fixed').replaceChildren(...rows.filter(row => row.fixed && !row.name.startsWith('qos_overrides')).flatMap(row => {
     const name = document.createElement('dt'), value = document.createElement('dd');
     name.textContent = row.name;
     value.dataset.fixed = row.name;
@@ -387,7 +388,7 @@ function makeControl(row) {
     if (!force && (control.busy || control.next != null)) return;
     if (force || document.activeElement !== field || listed) field.value = shown;
     if (slider) {
-      if (shown > slider.max) slider.max = shown * 1.5;
+      slider.max = shown > end ? shown * 1.5 : end;
       slider.value = shown;
     }
   }
@@ -444,7 +445,7 @@ document.addEventListener('click', event => {
 });
 $('operate').onclick = () => act(server.operating ? {do: 'release'} : {do: 'operate', take_over: !!server.operator});
 $('take-recommended').onclick = () => act({do: 'set', node: 'lathe', values: {spindle_speed_rpm: Math.round(recommended)}});
-$('knock').onclick = () => act({do: 'knock', impulse: Number($('impulse').value) / 1e3});
+$('knock').onclick = () => $('impulse').value.trim() === '' ? notify({ok: false, text: 'Give the knock a size, in mN s.'}) : act({do: 'knock', impulse: Number($('impulse').value) / 1e3});
 $('play').onclick = () => act(cell.scenario?.playing ? {do: 'stop_playing'} : {do: 'play', scenario: $('scenario').value});
 $('lathes').onchange = choose;
 $('mode').onchange = () => act({do: 'set', node: 'supervisor', values: {mode: $('mode').value}}).then(answer => {
