@@ -96,8 +96,7 @@ class MonitorNode(ParameterNode):
         self._detector = self._new_detector()
         self._continuity, self._since = Continuity(), 'nothing yet'
         self._complaint = ''
-        self._state, self._flag = _UNKNOWN, False
-        self._flag_since = math.nan
+        self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
         self._logged_advice = Advice()
         self._mode = Mode.WAITING
         self._faults: tuple[str, ...] = ()
