@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 from argparse import ArgumentParser, Namespace
@@ -26,7 +27,7 @@ from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.entry_points import no_ros
 from lathe_chatter.recording import read_run
-from lathe_chatter.report.run_history import read_history
+from lathe_chatter.report.run_history import History, read_history
 from lathe_chatter.scenario import (
     CLEARED,
     FLAGGED,
@@ -95,7 +96,7 @@ def run(options: Namespace) -> int:
             raise
         screen.say('It has failed: the run is reported up to then ...')
         with suppress(RunReadError):
-            screen.json(show_run(read_history(output), screen))
+            _report(output, screen)
         if isinstance(error, ScenarioFailedError):
             raise  # a mistake in what was asked
         sys.stderr.write(f'lathe-chatter run: {error}\n')
@@ -107,8 +108,7 @@ def run(options: Namespace) -> int:
     if interrupted:
         word = 'Ended' if options.page else 'Interrupted'
         screen.say(f'{word}: the run is finished and reported ...')
-    history = read_history(output)
-    screen.json(show_run(history, screen))
+    history = _report(output, screen)
     if options.page:
         return 0  # there is no other way to end it
     if interrupted:
@@ -137,6 +137,21 @@ def _scenario(file: Path, options: Namespace) -> Scenario:
         supervisor = {**(scenario.supervisor or {}), 'mode': options.supervise}
         scenario = replace(scenario, supervisor=supervisor)
     return scenario
+
+
+def _report(output: Path, screen: Screen) -> History:
+    """Report a run, and name those that its recorder has begun after it, as somebody wished."""
+    history, metadata = read_history(output), output / 'metadata.yaml'
+    screen.json(show_run(history, screen))
+    ended = metadata.stat().st_mtime if metadata.exists() else math.inf
+    later = [
+        str(each)
+        for each in sorted(output.parent.glob(f'{output.name}-*'))
+        if each.is_dir() and each.stat().st_mtime >= ended
+    ]
+    if later:
+        screen.say(f'Recorded anew meanwhile, and not in this report: {", ".join(later)}')
+    return history
 
 
 def _has_samples(output: Path) -> bool:

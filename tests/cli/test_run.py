@@ -364,8 +364,16 @@ def test_with_the_page_it_runs_until_it_is_told_to_end(environment: Any, tmp_pat
     asked.request('GET', '/')
     assert b'<title>Lathe</title>' in asked.getresponse().read()
     time.sleep(3.0)
+    for service in ('stop', 'start'):
+        call = ['service', 'call', f'/run_recorder/{service}', 'std_srvs/srv/Trigger']
+        subprocess.run(
+            [sys.executable, '-m', 'support.ros2_commands', *call],
+            env={**environment, 'PYTHONPATH': str(Path(__file__).parents[1])}, check=True,
+            timeout=60,
+        )  # fmt: skip
     process.send_signal(signal.SIGINT)
     said, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
+    assert f'Recorded anew meanwhile, and not in this report: {output}-2' in said
     assert 'Ended: the run is finished' in said
     assert main(['verify', str(output)]) == 0

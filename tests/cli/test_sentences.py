@@ -97,6 +97,7 @@ TOLD_ELSEWHERE = {
     'not complete yet: nothing is missing so far': 'recording/test_live_run.py',
     'Interrupted: the run is finished and reported ...': 'test_run.py',
     'It has failed: the run is reported up to then ...': 'test_run.py',
+    'Recorded anew meanwhile, and not in this report: ': 'test_run.py',
     'Interrupted: the run above is recorded up to that moment.': 'test_run.py',
     'Interrupted: what was drawn is removed again.': 'test_reproduce.py',
     'Interrupted: the same call goes on from ': 'test_sentences.py',
