@@ -62,7 +62,7 @@ def test_a_cell_that_cannot_keep_up_slows_down_and_loses_nothing(
     found = verify(run)
     assert not [finding.text for finding in found.findings if finding.loss]
     assert found.samples['/lathe/samples'].first == 1e-4
-    assert found.samples['/lathe/samples'].samples > 300_000
+    assert found.samples['/lathe/samples'].samples > 20 * 2_000  # most of these are blocks
 
 
 def test_a_wrong_parameter_of_one_of_them_keeps_the_cell_from_starting(
