@@ -64,12 +64,12 @@ def configure(parser: ArgumentParser) -> None:
 def _body_and_file(text: str) -> tuple[str, Path]:
     body, equals, file = text.partition('=')
     if not equals and text:
-        return 'tool', Path(text)
+        return 'tool', path_of(text)
     if body not in _BODIES or not file:
         raise argparse.ArgumentTypeError(
             f'{text!r} must be a file of the tool, tool=FILE or workpiece=FILE'
         )
-    return body, Path(file)
+    return body, path_of(file)
 
 
 def _body_and_count(text: str) -> tuple[str, int]:

@@ -356,7 +356,7 @@ class MonitorNode(ParameterNode):
         self._reported_at, self._reported_lost = self._heard_at, self._continuity.lost
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
-        since = {'flag since, s': self._flag_since} if self._flag_since > -math.inf else {}
+        since = {'flag since, s': self._flag_since} if math.isfinite(self._flag_since) else {}
         cut = {'state': self._state, 'flag': self._flag, **since, **self._figures, **self._details}
         # Whether the chatter of a flag that is up goes on is not known then.
         level = WARN if self._silent and self._flag else _LEVELS.get(self._state, OK)

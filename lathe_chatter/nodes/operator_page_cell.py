@@ -150,7 +150,7 @@ class OperatedCell:
 
     def _on_flag(self, message: Bool) -> None:
         """The lamp; since when it is lit or out, the monitor's diagnostics say."""
-        self.board.put('flag', {'up': message.data, 'since': None})
+        self.board.put('flag', {'up': message.data})
         if self._player is not None:
             found = [self._figures.get(n, (math.nan,))[0] for n in ('frequency', 'growth_rate')]
             self._player.on_flag(self._signals.time, *found, up=message.data)

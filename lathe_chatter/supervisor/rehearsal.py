@@ -14,6 +14,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.knocks import resting_state
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model.lathe_parameter_table import CUT_ROWS
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.model.quantity_fields import limits_of
 
@@ -32,10 +33,7 @@ _DIED, _FALLS = 0.1, 0.6
 third of that time where it is dying."""
 _LONGEST_RAMP = 20.0
 """s: one that takes longer is taken to be faster."""
-_NOISE = dict.fromkeys(
-    ('force_noise', 'cutting_force_noise', 'sensor_noise', 'runout', 'tool_runout', 'unbalance'),
-    0.0,
-)
+_NOISE = {row.name: 0.0 for row in CUT_ROWS if row.only_samples}
 
 
 def dies(  # noqa: PLR0913 -- a move, and in what it begins

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -160,15 +161,14 @@ def advised(figures: dict[str, Any]) -> float:
     return float([word for word in words if word.startswith('advice: ')][-1].split()[1])
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_is_complete_up_to_then(
-    number: signal.Signals, tmp_path: Path, environment: dict[str, str]
-) -> None:
-    scenario = tmp_path / 'short.yaml'
+def played_until_changed(
+    folder: Path, environment: dict[str, str], act: Callable[[int], None]
+) -> tuple[int, str]:
+    """Exit code and words of a run to which something is done once its depth has changed."""
+    scenario = folder / 'short.yaml'
     scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 30.0'))
-    output = tmp_path / 'run'
     with subprocess.Popen(
-        command('--scenario', str(scenario), '--output', str(output)),
+        command('--scenario', str(scenario), '--output', str(folder / 'run')),
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -181,10 +181,19 @@ def test_an_interrupted_run_is_complete_up_to_then(
             seen.append(line)
             # Once: interrupted while it prints, the console may print that line again.
             if 'depth_of_cut = 0.00062' in line and not told:
-                process.send_signal(number)
+                act(process.pid)
                 told = True
-        assert process.wait(60) == 128 + number, ''.join(seen)
-    assert 'recorded up to that moment' in ''.join(seen)
+        return process.wait(60), ''.join(seen)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_is_complete_up_to_then(
+    number: signal.Signals, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    code, said = played_until_changed(tmp_path, environment, lambda run: os.kill(run, number))
+    output = tmp_path / 'run'
+    assert code == 128 + number, said
+    assert 'recorded up to that moment' in said
     assert main(['verify', str(output)]) == 0
     assert (output / 'metadata.yaml').is_file()
 
@@ -238,24 +247,9 @@ def test_a_refused_step_ends_the_run_with_the_reason(
 def test_a_lathe_that_is_killed_ends_the_run_with_a_report(
     tmp_path: Path, environment: dict[str, str]
 ) -> None:
-    scenario = tmp_path / 'short.yaml'
-    scenario.write_text(SHORT.replace('duration: 3.0', 'duration: 30.0'))
+    code, said = played_until_changed(tmp_path, environment, kill_the_lathe_of)
     output = tmp_path / 'run'
-    with subprocess.Popen(
-        command('--scenario', str(scenario), '--output', str(output)),
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        seen = []
-        for line in process.stdout:
-            seen.append(line)
-            if 'depth_of_cut = 0.00062' in line:
-                kill_the_lathe_of(process.pid)
-        assert process.wait(60) == 1, ''.join(seen)
-    said = ''.join(seen)
+    assert code == 1, said
     assert 'lathe was ended by the signal SIGKILL.' in said
     assert 'reported up to then' in said
     assert (output / 'report.png').is_file()

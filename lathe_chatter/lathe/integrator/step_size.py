@@ -58,10 +58,8 @@ def steps_per_sample(setup: LatheSetup, cut: Cut, speed: float) -> int:
 def _fastest(setup: LatheSetup, cut: Cut, speed: float) -> float:
     """The largest |lambda| of any regime at any speed to come, per sample."""
     slowest = min(cut.spindle_speed_rpm / 60.0, speed) * (1.0 - cut.speed_variation_amplitude)
-    if cut.process_damping == 0.0 or slowest * 60.0 >= cut.spindle_speed_rpm:
-        settings = settings_of(setup, cut, 1)
-    else:
-        settings = settings_of(setup, cut, 1).copy()
+    settings = settings_of(setup, cut, 1)
+    if slowest * 60.0 < cut.spindle_speed_rpm:
         settings[layout.PROCESS_DAMPING] *= cut.spindle_speed_rpm / (60.0 * slowest)
     return max(
         basis_in(setup.machine, regime, *acting_in(settings, regime)[:3]).rate

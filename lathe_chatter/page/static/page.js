@@ -397,14 +397,14 @@ function makeControl(row) {
     control.next = value;
     if (control.busy) return;
     control.busy = true;
-    let answer = {ok: true, text: ''}, wanted;
+    let answer = {ok: true, text: ''}, last;
     while (control.next != null) {
-      wanted = control.next;
+      last = control.next;
       control.next = null;
-      answer = await ask({do: 'set', node: 'lathe', values: {[row.name]: wanted}});
+      answer = await ask({do: 'set', node: 'lathe', values: {[row.name]: last}});
     }
     control.busy = false;
-    const outside = unit !== row.unit && (wanted < row.low || wanted > row.high);
+    const outside = unit !== row.unit && (last < row.low || last > row.high);
     const here = outside ? ` That is ${number(row.low * factor)} to ${number(row.high * factor)} ${unit}.` : '';
     refusal.textContent = answer.ok ? '' : answer.text + here;
     if (!answer.ok && cell.lathe_values) show(cell.lathe_values[row.name], true);
