@@ -43,7 +43,7 @@ class Cut:
     feed_speed: float = quantity('feed speed', 'm/s', default=0.0025, high=0.1)
     feed_per_revolution: float = quantity(
         'feed per revolution that the feed speed follows the spindle by; 0: feed_speed rules',
-        'm',
+        'm/rev',
         default=0.0,
         high=0.01,
     )

@@ -106,7 +106,7 @@ def feed_refusal(given: Mapping[str, Any], present: Mapping[str, Any]) -> str:
     if not feed or speed in {None, present['feed_speed']} or 'feed_per_revolution' in given:
         return ''
     return (
-        f'feed_speed is {speed:g} m/s, and feed_per_revolution, {feed:g} m, rules: give '
+        f'feed_speed is {speed:g} m/s, and feed_per_revolution, {feed:g} m/rev, rules: give '
         'feed_per_revolution 0 with it, or another one.'
     )
 

@@ -13,6 +13,7 @@ from decimal import Decimal
 
 _TURN = 2.0 * math.pi
 _G = 9.80665
+_LENGTH = {'m': 1.0, 'mm': 1e-3, 'um': 1e-6, 'in': 0.0254}
 _RATE = {'Hz': 1.0, 'kHz': 1e3, '1/s': 1.0}
 
 UNITS: dict[str, dict[str, float]] = {
@@ -22,10 +23,8 @@ UNITS: dict[str, dict[str, float]] = {
     'rev/min': {'rev/min': 1.0, 'rpm': 1.0, '1/min': 1.0, 'Hz': 60.0, 'rad/s': 60.0 / _TURN},
     'rev/min per s': {'rev/min per s': 1.0, 'rpm/s': 1.0, 'rev/min/s': 1.0},
     'kg': {'kg': 1.0, 'g': 1e-3, 't': 1e3, 'lb': 0.45359237},
-    'm': {
-        'm': 1.0, 'mm': 1e-3, 'um': 1e-6, 'in': 0.0254,
-        'm/rev': 1.0, 'mm/rev': 1e-3, 'um/rev': 1e-6, 'in/rev': 0.0254,
-    },
+    'm': _LENGTH,
+    'm/rev': {**{f'{name}/rev': factor for name, factor in _LENGTH.items()}, **_LENGTH},
     'm/s': {'m/s': 1.0, 'mm/s': 1e-3, 'mm/min': 1e-3 / 60.0, 'm/min': 1.0 / 60.0},
     'm/s2': {'m/s2': 1.0, 'mm/s2': 1e-3, 'g': _G},
     'N/m': {

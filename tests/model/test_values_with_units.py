@@ -26,7 +26,8 @@ from lathe_chatter.model.values_with_units import UNITS, number_in, units_of
         ('50 g', 'kg', 0.05),
         ('2 g', 'm/s2', 2.0 * 9.80665),
         ('2 mm', 'm', 0.002),
-        ('0.2 mm/rev', 'm', 0.0002),
+        ('0.2 mm/rev', 'm/rev', 0.0002),
+        ('0.2 mm', 'm/rev', 0.0002),
         ('3000 rpm', 'rev/min', 3000.0),
         ('50 Hz', 'rev/min', 3000.0),
         ('6 m/min', 'm/s', 0.1),
@@ -39,7 +40,7 @@ def test_a_value_with_its_unit(text: str, unit: str, value: float) -> None:
 @pytest.mark.parametrize(
     ('text', 'unit'),
     [('2 mm', 'kg'), ('MPa', 'N/m2'), ('1,5 mm', 'm'), ('1 2', ''), ('', 'm'), ('2 furlong', 'm'),
-     ('3 m', 'N/m'), ('nan', 'm')],
+     ('3 m', 'N/m'), ('nan', 'm'), ('0.2 mm/rev', 'm')],
 )  # fmt: skip
 def test_what_is_no_such_value_is_none(text: str, unit: str) -> None:
     assert number_in(text, unit) is None

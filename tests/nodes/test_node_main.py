@@ -25,8 +25,7 @@ WRONG = {
         'depth_of_cut is nan m: it must be a finite number from 0 to 0.1 m.'
     ),
     (LATHE, 'depth_of_cut:=deep'): (
-        "depth_of_cut is 'deep': it must be a finite number from 0 to 0.1 m, in m, mm, um, in, "
-        'm/rev, mm/rev, um/rev, in/rev.'
+        "depth_of_cut is 'deep': it must be a finite number from 0 to 0.1 m, in m, mm, um, in."
     ),
     (LATHE, 'bearing_contact:=loose'): (
         "bearing_contact is 'loose': it must be one of none, gap, seated, both_sides."
