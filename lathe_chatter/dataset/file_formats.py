@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 
 from lathe_chatter.dataset.plan import Form
-from lathe_chatter.dataset.windows import DrawnRun, Table
+from lathe_chatter.dataset.windows import DrawnRun, Table, unit_of
 from lathe_chatter.errors import optional
 from lathe_chatter.lathe.change_and_knock_sentences import Knock
 
@@ -33,10 +33,16 @@ def files_of(form: Form, table: Table, runs: list[DrawnRun], duration: float) ->
         elif form is Form.HDF5:
             with optional('h5py', 'HDF5').File(part, 'w') as file:
                 file.update(plain)
+                for column in plain:
+                    file[column].attrs['units'] = unit_of(column)
         elif form is Form.ZARR:
             with warnings.catch_warnings():
                 warnings.simplefilter('ignore')  # Zarr 3 has not settled on bytes yet
-                optional('zarr', 'Zarr').save_group(str(part), **plain)
+                zarr = optional('zarr', 'Zarr')
+                zarr.save_group(str(part), **plain)
+                group = zarr.open_group(str(part), mode='r+')
+                for column in plain:
+                    group[column].attrs['units'] = unit_of(column)
         else:
             _write_runs(part, table, runs, duration)
         files = [part] if part.is_file() else sorted(f for f in part.rglob('*') if f.is_file())
@@ -52,9 +58,15 @@ def _write_parquet(path: Path, table: Table) -> None:
         else arrow.array(values)
         for name, values in table.items()
     }
+    schema = arrow.schema(
+        arrow.field(name, column.type, metadata={'unit': unit_of(name)})
+        for name, column in columns.items()
+    )
     # Noise does not compress: that would take as long as all else and save a hundredth.
     plain = {'compression': 'none', 'use_dictionary': False, 'write_statistics': False}
-    optional('pyarrow.parquet', 'Parquet').write_table(arrow.table(columns), path, **plain)
+    optional('pyarrow.parquet', 'Parquet').write_table(
+        arrow.table(columns, schema=schema), path, **plain
+    )
 
 
 def _write_runs(folder: Path, table: Table, runs: list[DrawnRun], duration: float) -> None:

@@ -19,14 +19,13 @@ from jinja2 import StrictUndefined, Template
 
 from lathe_chatter.dataset.file_formats import ENDINGS, Files, files_of, read_part
 from lathe_chatter.dataset.plan import Form, Plan
-from lathe_chatter.dataset.windows import Table, drawn_machine, windows_of
+from lathe_chatter.dataset.windows import Table, drawn_machine, unit_of, windows_of
 from lathe_chatter.errors import DatasetError, reason_of
 from lathe_chatter.executors import run_batches
 from lathe_chatter.fingerprint import code_identity
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.resumable_results import ResultFile
-from lathe_chatter.samples.columns import UNITS
 
 MANIFEST, CARD = 'manifest.jsonl', 'README.md'
 _PART_SIZE = 8e6
@@ -114,7 +113,7 @@ def make_dataset(
         entries = [there[name] for name in parts_of(plan)]
         template = package_files(__package__).joinpath('card.md.j2').read_text(encoding='utf-8')
         card = Template(template, undefined=StrictUndefined)
-        text = card.render(plan=plan, header=header, parts=entries, units=UNITS, table=LATHE)
+        text = card.render(plan=plan, header=header, parts=entries, unit_of=unit_of, table=LATHE)
         (folder / CARD).write_text(text, encoding='utf-8')
         in_order = [json.dumps(line) + '\n' for line in (header, *entries)]
         _write(manifest, {'.': ''.join(in_order).encode()})

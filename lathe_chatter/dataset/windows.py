@@ -15,17 +15,23 @@ from lathe_chatter.dataset.plan import OF_FILE, Plan
 from lathe_chatter.lathe import EventKind
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameter_table import MACHINE_FILE
+from lathe_chatter.model.lathe_parameter_table import LATHE, MACHINE_FILE
 from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.model.uncertainty import uncertainty_from
 from lathe_chatter.samples import sample_columns
-from lathe_chatter.samples.columns import ACCELERATION_COLUMNS
+from lathe_chatter.samples.columns import ACCELERATION_COLUMNS, UNITS
 from lathe_chatter.stability import safe_limit
 from lathe_chatter.stability.characteristic import Complex
 from lathe_chatter.stability.cuts_at_mean_force import operating_points
 
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""
+_UNITS = {
+    'start': 's',
+    'growth_rate': '1/s',
+    'frequency': 'Hz',
+    'seconds_since_onset': 's',
+} | UNITS
 _REGIMES = np.array(['free', 'rattling', 'seated'])
 _CONTACTS = {
     EventKind.BEARING_ENGAGES: (0, True),
@@ -37,6 +43,11 @@ _RAMP = 20
 """Steps in which a value that takes its time changes."""
 _DEEPEST = limits_of(Cut, 'depth_of_cut').high
 _OF_MACHINE, _OF_RUN = 0, 1
+
+
+def unit_of(column: str) -> str:
+    """The unit of a column of windows; empty for a pure number or a word."""
+    return _UNITS.get(column, LATHE[column].unit if column in LATHE else '')
 
 
 @dataclass(frozen=True)

@@ -160,6 +160,27 @@ def test_the_same_windows_in_every_form(form: str, tmp_path: Path) -> None:
     assert [e['windows_sha256'] for e in entries] == [e['windows_sha256'] for e in again]
 
 
+@pytest.mark.parametrize('form', ['parquet', 'hdf5', 'zarr'])
+def test_every_column_of_a_part_has_the_unit_that_the_card_says(form: str, tmp_path: Path) -> None:
+    """As the libraries of the formats read it."""
+    library = pytest.importorskip({'hdf5': 'h5py', 'parquet': 'pyarrow.parquet'}.get(form, form))
+    make_dataset(plan_of(tmp_path, f'form: {form}\n'), tmp_path / form)
+    part = next((tmp_path / form).glob('train/part-*'))
+    if form == 'parquet':
+        schema = library.read_schema(part)
+        found = {name: schema.field(name).metadata[b'unit'].decode() for name in schema.names}
+    else:
+        file = library.File(part) if form == 'hdf5' else library.open_group(str(part), mode='r')
+        found = {name: file[name].attrs['units'] for name in file}
+    card = (tmp_path / form / generation.CARD).read_text(encoding='utf-8')
+    rows = [line.split('|') for line in card.splitlines() if line.startswith('| `')]
+    assert {row[1].strip(' `'): row[2].strip() for row in rows} == {
+        name: unit or '1' for name, unit in found.items()
+    }
+    assert found['tool_displacement'] == found['depth_of_cut'] == 'm'
+    assert found['growth_rate'] == '1/s'
+
+
 def test_whole_runs_hold_the_samples_of_the_windows(tmp_path: Path) -> None:
     windows, runs = plan_of(tmp_path), plan_of(tmp_path, 'form: mcap')
     make_dataset(windows, tmp_path / 'windows')
