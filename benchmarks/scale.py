@@ -2,7 +2,7 @@
 
     python benchmarks/scale.py [PART ...] [--windows N] [--workers N] [--picture FILE]
 
-Parts: truth windows hashes workers environment size (all of these by default; some three minutes
+Parts: truth windows hashes workers environment (all of these by default; some three minutes
 on two idle cores) and picture. Where others use the machine the time on its clock says little:
 processor time stands beside it, and the load at the beginning. `picture` draws how time falls with
 workers that have a core each. Measured is, of 1 to 4 of them, the processor time of the busiest
@@ -17,7 +17,6 @@ import os
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
-import ast
 import hashlib
 import heapq
 import pickle
@@ -86,7 +85,6 @@ def main() -> None:
         'hashes': hashes,
         'workers': workers,
         'environment': environment,
-        'size': size,
         'picture': picture,
     }
     unknown = set(options.parts) - set(parts)
@@ -330,31 +328,6 @@ def environment(_options: Any) -> None:
         show(
             f'environment, steps of 20 ms a s and core: the setting is {what}', f'{rate:.0f}', goal
         )
-
-
-def size(_options: Any) -> None:
-    """Lines of Python: of code, without docstrings, comments and empty ones; and all."""
-    package = ROOT / 'lathe_chatter'
-    for what, files, goal in (
-        ('executors', [package / 'executors.py'], '200'),
-        ('data sets', sorted((package / 'dataset').glob('*.py')), '500'),
-        ('environment', [package / 'gym_environment.py'], '100'),
-    ):
-        texts = [file.read_text(encoding='utf-8') for file in files]
-        lines = sum(len(text.splitlines()) for text in texts)
-        show(f'{what}: lines of code (of {lines} in all)', f'{sum(map(code_lines, texts))}', goal)
-
-
-def code_lines(text: str) -> int:
-    """How many lines of a module are neither docstring, comment nor empty."""
-    said = {
-        line
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        for line in range(node.lineno, (node.end_lineno or 0) + 1)
-    }
-    lines = enumerate(text.splitlines(), 1)
-    return sum(bool(line.split('#')[0].strip()) and number not in said for number, line in lines)
 
 
 def simulated(batches: Array, serial: float, count: int) -> float:

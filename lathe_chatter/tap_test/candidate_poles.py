@@ -28,17 +28,13 @@ def candidate_poles(responses: Sequence[FrequencyResponse]) -> list[tuple[float,
             raise ModalFitError(
                 "A tap test needs the package sdypy-EMA: pip install 'lathe_chatter[identify]'."
             ) from None
-        response = responses[0]
-        frequency = response.frequency
+        response, frequency = responses[0], responses[0].frequency
+        receptance = response.response / response.of_receptance
         order = min(_POLE_ORDER, frequency.size // 8)
         model = EMA.Model(
-            frf=(response.response / response.of_receptance)[None, :],
-            freq=frequency,
-            lower=float(frequency[0]),
-            upper=float(frequency[-1]),
-            pol_order_high=int(order),
-            frf_form='receptance',
-        )
+            receptance[None, :], frequency, frf_form='receptance', pol_order_high=order,
+            lower=float(frequency[0]), upper=float(frequency[-1]),
+        )  # fmt: skip
         model.get_poles(method='lscf', show_progress=False)
     poles = np.concatenate([np.atleast_1d(np.asarray(p, complex)) for p in model.all_poles])
     size = np.abs(poles)

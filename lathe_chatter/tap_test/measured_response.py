@@ -33,6 +33,12 @@ ORDERS = {'receptance': 0, 'mobility': 1, 'accelerance': 2}
 
 _G = 9.80665
 _LENGTHS = {'m': 1.0, 'mm': 1e-3, 'um': 1e-6, 'µm': 1e-6, 'in': 0.0254}
+_MOTIONS = {
+    length + suffix: (form, factor)
+    for length, factor in _LENGTHS.items()
+    for form, suffix in zip(ORDERS, ('', '/s', '/s2'), strict=True)
+} | dict.fromkeys(('g', 'gn'), ('accelerance', _G))
+"""What is measured in a unit over that of the force, and the factor to SI."""
 _FORCES = {'n': 1.0, 'kn': 1e3, 'lbf': 4.4482216152605}
 _UFF_ORDERS = {8: 0, 11: 1, 12: 2}
 """Specific data types of dataset 58: displacement, velocity, acceleration."""
@@ -155,12 +161,9 @@ def _universal(path: Path) -> Iterator[FrequencyResponse]:
             continue
         order = _UFF_ORDERS.get(entry.get('ordinate_spec_data_type'))
         over = entry.get('orddenom_spec_data_type', _UFF_FORCE)
+        labels = (entry.get(f'{axis}_axis_units_lab') or '' for axis in ('ordinate', 'orddenom'))
         unit, below = (
-            text if text.upper() != 'NONE' else ''
-            for text in (
-                str(entry.get(f'{part}_axis_units_lab') or '').strip()
-                for part in ('ordinate', 'orddenom')
-            )
+            '' if label.strip().upper() == 'NONE' else label.strip() for label in labels
         )
         if over not in {_UFF_FORCE, 0} or (order is None and not unit):
             raise FrequencyResponseError(
@@ -168,34 +171,21 @@ def _universal(path: Path) -> Iterator[FrequencyResponse]:
                 'over force.'
             )
         unit = unit or ('m', 'm/s', 'm/s2')[order or 0]
-        below = below or 'N'
-        form, scale = _unit(unit if '/' in unit and _over_force(unit) else f'{unit}/{below}', path)
+        whole = unit.rpartition('/')[2].strip().lower() in _FORCES
+        form, scale = _unit(unit if whole else f'{unit}/{below or "N"}', path)
         if order is not None and ORDERS[form] != order:
             raise FrequencyResponseError(
-                f'{path}: a function is said to be {_name(order)} and has the unit {unit}.'
+                f'{path}: a function is said to be {[*ORDERS][order]} and has the unit {unit}.'
             )
         beside = coherences.get(_points(entry))
         coherence = None if beside is None else np.clip(np.real(beside['data']), 0.0, 1.0)
-        yield FrequencyResponse(
-            np.asarray(entry['x'], float),
-            (np.asarray(entry['data']) * scale).astype(np.complex128),
-            form,
-            coherence,
-            str(path),
-        )
+        data = np.asarray(entry['data'], np.complex128) * scale
+        yield FrequencyResponse(np.asarray(entry['x'], float), data, form, coherence, str(path))
 
 
 def _points(entry: dict[str, Any]) -> tuple[Any, ...]:
     names = ('rsp_node', 'rsp_dir', 'ref_node', 'ref_dir')
     return tuple(entry.get(name) for name in names)
-
-
-def _name(order: int) -> str:
-    return next(name for name, value in ORDERS.items() if value == order)
-
-
-def _over_force(unit: str) -> bool:
-    return unit.rpartition('/')[2].strip().lower() in _FORCES
 
 
 def _unit(text: str, path: Path, column: str = '') -> tuple[str, float]:
@@ -204,13 +194,9 @@ def _unit(text: str, path: Path, column: str = '') -> tuple[str, float]:
     plain = re.sub(r'[()*·^\s]', '', text.replace('²', '2').replace('\ufffd', '2'))
     before = re.match(r'1/(kN|N|lbf)(.+?)(?:/N)?$', plain)
     motion, force = (before[2], before[1]) if before else plain.rpartition('/')[::2]
-    scale = _FORCES.get(force.lower())
-    if motion.lower() in {'g', 'gn'} and scale:
-        return 'accelerance', _G / scale
-    for length, factor in _LENGTHS.items():
-        for order, suffix in enumerate(('', '/s', '/s2')):
-            if motion == length + suffix and scale:
-                return _name(order), factor / scale
+    if motion.lower() in _MOTIONS and force.lower() in _FORCES:
+        form, factor = _MOTIONS[motion.lower()]
+        return form, factor / _FORCES[force.lower()]
     raise FrequencyResponseError(
         f'{path}: the unit{column and f" of {column}"} is {text!r}: it must be a length (m, mm, '
         'um, in), such a length /s or /s2, or g, over a force (N, kN, lbf).'
@@ -230,10 +216,10 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
     columns: dict[str, int] = {}
     units: dict[str, str] = {}
     for k, cell in enumerate(head):
-        match = re.match(r'^\s*(\w+)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*$', cell)
-        name = match[1].lower() if match else ''
-        name = next((known for known in _COLUMNS if name and known.startswith(name)), name)
-        columns[name], units[name] = k, (match[2] or '' if match else '')
+        match = re.match(r'\s*(\w+)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*$', cell)
+        word, unit = (match[1].lower(), match[2] or '') if match else (f'column {k + 1}', '')
+        name = next((known for known in _COLUMNS if known.startswith(word)), word)
+        columns[name], units[name] = k, unit
     parts = ('real', 'imaginary') if 'real' in columns else ('magnitude', 'phase')
     for name in ('frequency', *parts):
         if name not in columns:
@@ -251,16 +237,12 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
     table = table.reshape(-1, len(head))
     first, second = (table[:, columns[name]] for name in parts)
     if parts[0] == 'magnitude':
-        turn = 1.0 if units['phase'].lower().startswith('rad') else np.pi / 180.0
-        response = first * np.exp(1j * turn * second)
-    else:
-        response = first + 1j * second
-    frequency = table[:, columns['frequency']]
-    if units['frequency'] == 'rad/s':
-        frequency = frequency / (2.0 * np.pi)
+        angle = second if units['phase'].lower().startswith('rad') else np.radians(second)
+        first, second = first * np.cos(angle), first * np.sin(angle)
+    per_hertz = 2.0 * np.pi if units['frequency'] == 'rad/s' else 1.0
+    frequency = table[:, columns['frequency']] / per_hertz
     coherence = table[:, columns['coherence']] if 'coherence' in columns else None
-    measured = (response * scale).astype(np.complex128)
-    yield FrequencyResponse(frequency, measured, form, coherence, str(path))
+    yield FrequencyResponse(frequency, (first + 1j * second) * scale, form, coherence, str(path))
 
 
 def _numbers(row: list[str], columns: int, separator: str, where: str) -> list[float]:

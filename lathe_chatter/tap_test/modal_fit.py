@@ -18,8 +18,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
 from lathe_chatter.array_types import Array
@@ -127,60 +129,49 @@ def fit_modes(
 
 
 class _Fit:
-    """The least-squares problem of some responses with common modes."""
+    """The least-squares problem of some responses, one after the other, with common modes."""
 
     def __init__(self, responses: tuple[FrequencyResponse, ...]) -> None:
         self.responses = responses
-        self.omega = [2.0 * np.pi * r.frequency for r in responses]
-        self.factor = [r.of_receptance for r in responses]
-        self.deviations = [self.roughness(r) for r in responses]
-        ends = [(w[0], w[-1]) for w in self.omega]
-        self.lowest, self.highest = min(e[0] for e in ends), max(e[1] for e in ends)
+        self.ends = np.cumsum([r.frequency.size for r in responses])[:-1]
+        self.omega = 2.0 * np.pi * np.concatenate([r.frequency for r in responses])
+        self.factor = np.concatenate([r.of_receptance for r in responses])
+        self.measured = np.concatenate([r.response for r in responses])
+        self.deviation = np.repeat(
+            [_roughness(r) for r in responses], [r.frequency.size for r in responses]
+        )
 
-    @staticmethod
-    def roughness(response: FrequencyResponse) -> Array:
-        """Noise by the roughness of the curve: its second differences, smoothed nowhere."""
-        rough = np.abs(np.diff(response.response, 2)) / math.sqrt(6.0)
-        floor = float(np.median(rough)) / math.sqrt(math.log(2.0)) / math.sqrt(2.0)
-        level = max(floor, 1e-9 * float(np.abs(response.response).max()))
-        return np.full(response.frequency.size, level)
-
-    def columns(self, poles: Sequence[tuple[float, float]], k: int) -> Complex:
+    def columns(self, poles: Sequence[tuple[float, float]]) -> Complex:
         """The response of each pole with unit 1/m, and of what lies outside the band (n, m + 2).
 
         The two residuals are of order one at the ends of the band.
         """
-        w = self.omega[k]
-        shapes = [self.factor[k] / (p**2 - w**2 + 2j * z * p * w) for p, z in poles]
-        above = self.factor[k] / self.highest**2
-        below = -self.factor[k] / w**2
-        return np.column_stack([*shapes, above, below])
+        w = self.omega
+        shapes = [self.factor / (p**2 - w**2 + 2j * z * p * w) for p, z in poles]
+        return np.column_stack([*shapes, self.factor / w.max() ** 2, -self.factor / w**2])
+
+    def weighed(self, values: Complex) -> Array:
+        """Values (n, ...) in standard deviations of the noise, real parts before imaginary."""
+        scaled = (values.T / self.deviation).T
+        return np.concatenate([scaled.real, scaled.imag])
 
     def amplitudes(self, poles: Sequence[tuple[float, float]]) -> tuple[Array, float]:
         """1/m of each pole and the residuals by linear least squares, and the cost left."""
-        blocks, targets = [], []
-        for k, response in enumerate(self.responses):
-            weighed = self.columns(poles, k) / self.deviations[k][:, None]
-            target = response.response / self.deviations[k]
-            blocks += [weighed.real, weighed.imag]
-            targets += [target.real, target.imag]
-        matrix, target = np.concatenate(blocks), np.concatenate(targets)
+        matrix, target = self.weighed(self.columns(poles)), self.weighed(self.measured)
         scale = np.linalg.norm(matrix, axis=0)
         found, *_ = np.linalg.lstsq(matrix / scale, target, rcond=1e-12)
         left = target - matrix / scale @ found
         return found / scale, float(left @ left)
 
-    def model(self, parameters: Array) -> list[Complex]:
-        """The responses that parameters give."""
-        poles, amplitudes = self.poles_of(parameters), self._amplitudes_of(parameters)
-        return [self.columns(poles, k) @ amplitudes for k in range(len(self.responses))]
+    def model(self, parameters: Array) -> Complex:
+        """The responses that parameters give (n,)."""
+        return self.columns(self.poles_of(parameters)) @ self._amplitudes_of(parameters)
 
     @staticmethod
     def poles_of(parameters: Array) -> list[tuple[float, float]]:
         """omega and zeta of each mode."""
-        n = (parameters.size - 2) // 3
         inside = np.clip(parameters, -_FAR, _FAR)  # a search that has lost its way stays finite
-        return [(math.exp(inside[3 * k]), math.exp(inside[3 * k + 1])) for k in range(n)]
+        return [(math.exp(p), math.exp(z)) for p, z, _ in inside[:-2].reshape(-1, 3)]
 
     @staticmethod
     def _amplitudes_of(parameters: Array) -> Array:
@@ -190,89 +181,76 @@ class _Fit:
         return np.concatenate([np.exp(exponents), parameters[-2:]])
 
     def _residual(self, parameters: Array) -> Array:
-        parts = []
-        for response, model, deviation in zip(
-            self.responses, self.model(parameters), self.deviations, strict=True
-        ):
-            left = (model - response.response) / deviation
-            parts += [left.real, left.imag]
-        return np.concatenate(parts)
+        return self.weighed(self.model(parameters) - self.measured)
 
     def _jacobian(self, parameters: Array) -> Array:
         """Of `_residual`, in closed form (2n, parameters)."""
-        poles, amplitudes = self.poles_of(parameters), self._amplitudes_of(parameters)
-        blocks = []
-        for k, deviation in enumerate(self.deviations):
-            w, shapes = self.omega[k], self.columns(poles, k)
-            columns = []
-            for (p, z), a, shape in zip(poles, amplitudes[:-2], shapes.T, strict=False):
-                response = a * shape
-                per_d = response * shape / self.factor[k]
-                columns += [
-                    2.0 * response - per_d * (2.0 * p**2 + 2j * z * p * w),
-                    -per_d * 2j * z * p * w,
-                    -response,
-                ]
-            slopes = np.column_stack([*columns, *shapes.T[-2:]]) / deviation[:, None]
-            blocks += [slopes.real, slopes.imag]
-        return np.concatenate(blocks)
+        poles, w = self.poles_of(parameters), self.omega
+        shapes, columns = self.columns(poles), list[Complex]()
+        for (p, z), a, shape in zip(
+            poles, self._amplitudes_of(parameters), shapes.T, strict=False
+        ):
+            response = a * shape
+            per_damping = -response * shape / self.factor * 2j * z * p * w
+            per_size = 2.0 * response * (1.0 - shape / self.factor * p**2) + per_damping
+            columns += [per_size, per_damping, -response]
+        return self.weighed(np.column_stack([*columns, shapes[:, -2:]]))
 
     def refine(self, poles: Sequence[tuple[float, float]]) -> Array:
         """All parameters together, with weights that are found from what is left."""
         amplitudes, _ = self.amplitudes(poles)
-        largest = float(np.abs(amplitudes[: len(poles)]).max())
-        parameters = np.array(
-            [
-                value
-                for (p, z), a in zip(poles, amplitudes[:-2], strict=True)
-                for value in (math.log(p), math.log(z), math.log(p**2 / max(a, 1e-3 * largest)))
-            ]
-            + list(amplitudes[-2:])
-        )
+        p, z = np.transpose(poles)
+        largest = float(np.abs(amplitudes[:-2]).max())
+        stiffness = p**2 / np.maximum(amplitudes[:-2], 1e-3 * largest)
+        modes = np.log([p, z, stiffness]).T
+        parameters: Array = np.concatenate([modes.ravel(), amplitudes[-2:]])
         for _ in range(_ROUNDS):
             scale = np.ones(parameters.size)
             scale[-2:] = np.maximum(np.abs(parameters[-2:]), largest)
             solved = least_squares(  # type: ignore[operator]  # the stubs take a module of that name for it
-                self._residual,
-                parameters,
-                self._jacobian,
-                x_scale=scale,
-                method='lm',
-                max_nfev=_MOST_CALLS,
-            )
+                self._residual, parameters, self._jacobian,
+                x_scale=scale, method='lm', max_nfev=_MOST_CALLS,
+            )  # fmt: skip
             parameters = np.asarray(solved.x, float)
-            self._weigh(parameters)
+            self._weigh(self.model(parameters))
         return parameters
 
-    def _weigh(self, parameters: Array) -> None:
+    def parts(self, values: NDArray[Any]) -> list[NDArray[Any]]:
+        """Values of each response."""
+        return np.split(values, self.ends)
+
+    def _weigh(self, model: Complex) -> None:
         """Find the noise of each value from what the model leaves.
 
         The variance of each is sought as floor^2 + share^2 |H|^2, or with the coherence g as
         floor^2 + share^2 |H|^2 (1 - g)/g; both are sums of squares, fitted by the mean of
         |left|^2 with its own scatter as weight.
         """
-        for k, (response, model) in enumerate(
-            zip(self.responses, self.model(parameters), strict=True)
+        deviations = []
+        for response, part, old in zip(
+            self.responses, self.parts(model), self.parts(self.deviation), strict=True
         ):
-            left = np.abs(model - response.response) ** 2 / 2.0
-            shape = np.abs(model) ** 2
+            left, shape = np.abs(part - response.response) ** 2 / 2.0, np.abs(part) ** 2
+            least = 1e-12 * float(shape.max())
             if response.coherence is not None:
                 g = np.clip(_smooth(response.coherence), 1e-3, 1.0 - 1e-9)
                 shape = shape * (1.0 - g) / g
-            variance = np.maximum(self.deviations[k] ** 2, 1e-30)
+            variance, terms = (
+                np.maximum(old**2, 1e-30),
+                np.column_stack([np.ones(left.size), shape]),
+            )
             for _ in range(6):
-                matrix = np.column_stack([np.ones(left.size), shape]) / variance[:, None]
+                matrix = terms / variance[:, None]
                 scale = np.linalg.norm(matrix, axis=0) + 1e-300
                 found, _ = nnls(matrix / scale, left / variance)
-                variance = np.column_stack([np.ones(left.size), shape]) @ (found / scale)
-                variance = np.maximum(variance, 1e-12 * float(np.max(np.abs(model)) ** 2))
-            self.deviations[k] = np.sqrt(variance)
+                variance = np.maximum(terms @ (found / scale), least)
+            deviations.append(np.sqrt(variance))
+        self.deviation = np.concatenate(deviations)
 
     def information(self, parameters: Array) -> float:
         """The Bayesian information criterion: less is better."""
         left = self._residual(parameters)
-        deviations = np.concatenate([np.repeat(d, 2) for d in self.deviations])
-        likelihood = float(left @ left) + 2.0 * float(np.log(deviations).sum())
+        likelihood = float(left @ left) + 4.0 * float(np.log(self.deviation).sum())
         return likelihood + parameters.size * math.log(left.size)
 
     def result(self, parameters: Array, candidates: list[tuple[float, float]]) -> ModalFit:
@@ -283,28 +261,26 @@ class _Fit:
         inverse = np.linalg.pinv(jacobian / scale)
         whole = (inverse @ inverse.T) / np.outer(scale, scale)
         order = np.argsort(parameters[:-2:3])
-        index = np.concatenate([np.arange(3) + 3 * k for k in order])
+        index = (3 * order[:, None] + np.arange(3)).ravel()
         covariance = whole[np.ix_(index, index)]
-        modes = []
-        for place, k in enumerate(order):
-            spread = np.sqrt(np.diag(covariance)[3 * place : 3 * place + 3])
-            values = np.exp(parameters[3 * k : 3 * k + 3]) / (2.0 * math.pi, 1.0, 1.0)
-            frequency, zeta, stiffness = values.tolist()
-            f, z, s = (values * spread).tolist()
-            modes.append(FittedMode(frequency, zeta, stiffness, (f, z, s)))
-        found = tuple(modes)
-        return ModalFit(
-            found,
-            covariance,
-            self.responses,
-            tuple(self.model(parameters)),
-            tuple(self.deviations),
-            (
-                *_warnings(found, self.responses),
-                *_unexplained(self, parameters),
-                *_against(self, parameters, candidates),
-            ),
+        values = np.exp(parameters[index].reshape(-1, 3)) / (2.0 * math.pi, 1.0, 1.0)
+        errors = values * np.sqrt(np.diag(covariance)).reshape(-1, 3)
+        modes = tuple(
+            FittedMode(f, z, k, (df, dz, dk))
+            for (f, z, k), (df, dz, dk) in zip(values.tolist(), errors.tolist(), strict=True)
         )
+        model = self.model(parameters)
+        said = _warnings(modes, self.responses) + _unexplained(self, model)
+        said += _against(self, self.poles_of(parameters), candidates)
+        fitted, deviations = tuple(self.parts(model)), tuple(self.parts(self.deviation))
+        return ModalFit(modes, covariance, self.responses, fitted, deviations, tuple(said))
+
+
+def _roughness(response: FrequencyResponse) -> float:
+    """Noise by the roughness of the curve: its second differences, smoothed nowhere."""
+    rough = np.abs(np.diff(response.response, 2)) / math.sqrt(6.0)
+    floor = float(np.median(rough)) / math.sqrt(2.0 * math.log(2.0))
+    return max(floor, 1e-9 * float(np.abs(response.response).max()))
 
 
 def _smooth(values: Array, width: int = 5) -> Array:
@@ -328,9 +304,10 @@ def _next_pole(
     return best
 
 
-def _against(fit: _Fit, parameters: Array, candidates: list[tuple[float, float]]) -> list[str]:
+def _against(
+    fit: _Fit, poles: list[tuple[float, float]], candidates: list[tuple[float, float]]
+) -> list[str]:
     """Whether something moves against the force, as nothing does at the point where it acts."""
-    poles = fit.poles_of(parameters)
     found = _next_pole(fit, poles, candidates, sign=-1.0)
     if found is None:
         return []
@@ -341,12 +318,12 @@ def _against(fit: _Fit, parameters: Array, candidates: list[tuple[float, float]]
     return [f'{where}: it was not measured where that acts, or has its sign reversed.']
 
 
-def _unexplained(fit: _Fit, parameters: Array) -> list[str]:
+def _unexplained(fit: _Fit, model: Complex) -> list[str]:
     """Which responses the modes do not explain, beyond their roughness."""
     said = []
-    for response, model in zip(fit.responses, fit.model(parameters), strict=True):
-        noise = 2.0 * float(np.sum(fit.roughness(response) ** 2))
-        left = float(np.sum(np.abs(model - response.response) ** 2)) - noise
+    for response, part in zip(fit.responses, fit.parts(model), strict=True):
+        noise = 2.0 * response.frequency.size * _roughness(response) ** 2
+        left = float(np.sum(np.abs(part - response.response) ** 2)) - noise
         share = left / float(np.sum(np.abs(response.response) ** 2))
         if share > _EXPLAINED:
             left_out = (

@@ -25,6 +25,7 @@ def write_csv(path: Path, head: str, *columns: np.ndarray, separator: str = ',')
         ('mm/s/N', 'mobility', 1e3),
         ('m/s2/N', 'accelerance', 1.0),
         ('m/s²/kN', 'accelerance', 1e3),
+        ('MM/S2/N', 'accelerance', 1e3),
         ('(m/s^2)/N', 'accelerance', 1.0),
         ('(1/N)*(m/s²)', 'accelerance', 1.0),
         ('1/lbf*mm', 'receptance', 1e3 * 4.4482216152605),
@@ -56,6 +57,17 @@ def test_magnitude_and_phase_with_semicolons(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.response, truth.response, rtol=1e-12)
     np.testing.assert_allclose(found.frequency, truth.frequency, rtol=1e-12)
     assert found.coherence is None
+
+
+def test_a_column_without_a_name_is_passed_over(tmp_path: Path) -> None:
+    truth = tap_test()
+    file = write_csv(
+        tmp_path / 'test.csv', 'frequency (Hz),real (m/N),,imaginary (m/N)',
+        truth.frequency, truth.response.real, np.zeros(truth.frequency.size),
+        truth.response.imag,
+    )  # fmt: skip
+    (found,) = read_frequency_responses(file)
+    np.testing.assert_allclose(found.response, truth.response, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
