@@ -3,8 +3,10 @@
     python benchmarks/page [--seconds 30] [--pairs 5] [--minutes 60] [--simulated 3600] [PART ...]
     python benchmarks/page --output docs pictures
 
-Parts: feed files slider lateness memory recorded lines. Real nodes over real DDS, a real Chromium
-without a window; processor time from the kernel's accounts. `pictures` takes those of the docs.
+Parts: bare feed files slider lateness memory recorded lines; `bare` is the least that a browser
+takes for two plots, beside which that of the page in `feed` stands. Real nodes over real DDS, a
+real Chromium without a window; processor time from the kernel's accounts. `pictures` takes those
+of the docs.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 sys.path.append(str(Path(__file__).resolve().parents[2] / 'tests'))
 sys.path.append(str(Path(__file__).resolve().parents[1] / 'nodes'))
 
+import bare
 import domain_coordinator
 import files
 import live
@@ -31,6 +34,7 @@ import recorded
 from lathe_chatter.cli.bench import this_machine
 
 PARTS: dict[str, Callable[[Any], Iterator[str]]] = {
+    'bare': lambda options: bare.bare(options.seconds),
     'feed': lambda options: live.feed(options.seconds),
     'files': lambda _options: files.sizes(),
     'slider': lambda _options: live.slider(),

@@ -26,7 +26,7 @@ from lathe_chatter.page.server import answers, free_port
 PAGE = 'operator_page'
 TICK = 0.002
 _FRAME = 0.05
-_SETTLING, _PATIENCE = 5.0, 60.0
+SETTLING, _PATIENCE = 5.0, 60.0
 _KEPT = QoSProfile(depth=5000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -104,7 +104,7 @@ def browser_at(url: str) -> Iterator[Browser]:
             browser.close()
 
 
-def _family(pid: int) -> list[int]:
+def family_of(pid: int) -> list[int]:
     """A process and all that it has started."""
     parents = {}
     for entry in Path('/proc').glob('[0-9]*/stat'):
@@ -117,7 +117,7 @@ def _family(pid: int) -> list[int]:
     return found
 
 
-def _taken(pids: list[int]) -> float:
+def taken(pids: list[int]) -> float:
     """Processor time of some processes so far, s."""
     total = 0.0
     for pid in pids:
@@ -130,13 +130,13 @@ def feed(seconds: float) -> Iterator[str]:
     """Processor time of the node for the feed alone and with frames, and of the browser."""
     with running(LATHE), page() as (pid, url):
         silent = Viewer(url, frames=False)
-        time.sleep(_SETTLING)
+        time.sleep(SETTLING)
         before = cpu_seconds(pid)
         time.sleep(seconds)
         alone = 100.0 * (cpu_seconds(pid) - before) / seconds
         yield f'node, the feed from DDS alone: {alone:.1f} % of a core'
         viewer = Viewer(url, frames=True)
-        time.sleep(_SETTLING)
+        time.sleep(SETTLING)
         before, count = cpu_seconds(pid), viewer.count
         time.sleep(seconds)
         more = 100.0 * (cpu_seconds(pid) - before) / seconds - alone
@@ -144,12 +144,12 @@ def feed(seconds: float) -> Iterator[str]:
         yield f'node, {rate:.1f} frames/s over that: {more:.1f} % of a core more'
         viewer.close()
         with browser_at(url) as browser:
-            time.sleep(_SETTLING)
-            family = _family(browser.process.pid)
-            before, node = _taken(family), cpu_seconds(pid)
+            time.sleep(SETTLING)
+            family = family_of(browser.process.pid)
+            before, node = taken(family), cpu_seconds(pid)
             shown = browser.run('frames')
             time.sleep(seconds)
-            share = 100.0 * (_taken(family) - before) / seconds
+            share = 100.0 * (taken(family) - before) / seconds
             node = 100.0 * (cpu_seconds(pid) - node) / seconds
             rate = (browser.run('frames') - shown) / seconds
             yield (
@@ -174,7 +174,7 @@ def slider(sets: int = 100) -> Iterator[str]:
         listener.wait_for_samples()
         viewer = Viewer(url, frames=False)
         viewer.ask(do='operate', id=2)
-        listener.spin(limit=_SETTLING)
+        listener.spin(limit=SETTLING)
         asked = []
         for k in range(sets):
             asked.append(time.time_ns())
@@ -212,7 +212,7 @@ def lateness(seconds: float, pairs: int) -> Iterator[str]:
             without = _late(listener, seconds)
             with page() as (_, url):
                 viewers = [Viewer(url, frames=True) for _ in range(3)]
-                listener.spin(limit=_SETTLING)
+                listener.spin(limit=SETTLING)
                 found.append((without, _late(listener, seconds)))
                 for viewer in viewers:
                     viewer.close()
@@ -229,14 +229,14 @@ def memory(minutes: float) -> Iterator[str]:
     """What node and page have more at the end of watching than after its first fifth."""
     with running(LATHE), running(MONITOR), page() as (pid, url), browser_at(url) as browser:
 
-        def taken() -> tuple[float, float]:
+        def now() -> tuple[float, float]:
             browser.command('HeapProfiler.collectGarbage')
             return resident(pid), browser.run('performance.memory.usedJSHeapSize') / 1e6
 
         series = []
         for _ in range(6):
             time.sleep(10.0 * minutes)
-            series.append(taken())
+            series.append(now())
         node, heap = np.array(series).T
         yield (
             f'{minutes:.0f} minutes of watching: node {node[0]:.1f} MB at a sixth, {node[-1]:.1f} '
