@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import subprocess
+import sys
+import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,6 +22,18 @@ from lathe_chatter.recording import read_run
 _TIME = 'time'
 _OWN_TIMES = 1e-3
 """By how much times may differ from a rate that is given with them, relative."""
+
+# In a process of its own: one wrong bit in such a file can end that in which SciPy reads it.
+_MAT_TO_NPZ = """
+import sys, numpy as np
+from scipy.io import loadmat
+try:
+    found = {n: np.asarray(v) for n, v in loadmat(sys.argv[1]).items() if not n.startswith('__')}
+except Exception as error:
+    sys.exit(str(error) or type(error).__name__)
+numbers = {n: v.astype(float).ravel() for n, v in found.items() if v.dtype.kind in 'biuf'}
+np.savez(sys.argv[2], **numbers)
+"""
 
 
 @dataclass(frozen=True)
@@ -137,15 +152,18 @@ def _csv(path: Path) -> dict[str, Array]:
 
 
 def _mat(path: Path) -> dict[str, Array]:
-    from scipy.io import loadmat
-
-    found: dict[str, Array] = {}
-    for name, value in loadmat(path).items():
-        if not name.startswith('__') and np.issubdtype(np.asarray(value).dtype, np.number):
-            values = np.asarray(value, np.float64).ravel()
-            if values.size > 1:
-                found[name] = values
-    return found
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / 'numbers.npz'
+        done = subprocess.run(  # noqa: S603 -- ourselves
+            [sys.executable, '-c', _MAT_TO_NPZ, path, copy],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            lines = done.stderr.strip().splitlines()
+            said = lines[-1] if lines and done.returncode > 0 else 'it is damaged'
+            raise SignalFileError(f'{path} cannot be read: {said.rstrip(".")}.')
+        with np.load(copy) as arrays:
+            return {n: v for n, v in arrays.items() if v.size > 1}
 
 
 def _parquet(path: Path) -> dict[str, Array]:
