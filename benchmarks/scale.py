@@ -42,7 +42,7 @@ from lathe_chatter.executors import Processes, cores, run_batches
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.many_lathes import LatheSweep
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.stability.cuts_at_mean_force import operating_points
+from lathe_chatter.stability.stability_of_many_cuts import operating_points
 
 ROOT = Path(__file__).resolve().parents[1]
 MEASURED, PICTURED = (1, 2, 4), 16_000

@@ -24,8 +24,8 @@ from contextlib import nullcontext
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
+from lathe_chatter.code_identity import code_identity, processor_name
 from lathe_chatter.errors import WorkerError
-from lathe_chatter.fingerprint import code_identity, processor_name
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')

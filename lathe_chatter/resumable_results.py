@@ -13,9 +13,9 @@ from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
+from lathe_chatter.code_identity import code_identity
 from lathe_chatter.errors import ResultFileError, reason_of
 from lathe_chatter.executors import Item, Result, batches_of, run_batches
-from lathe_chatter.fingerprint import code_identity
 
 
 class ResultFile:

@@ -24,7 +24,15 @@ PACKAGE = ROOT / 'lathe_chatter'
 LONGEST = 400
 
 BASE = {
-    *('array_types', 'fingerprint', 'compiled', 'errors', 'executors', 'html_table', 'plot_style'),
+    *(
+        'array_types',
+        'code_identity',
+        'compiled',
+        'errors',
+        'executors',
+        'html_table',
+        'plot_style',
+    ),
     *('resumable_results', 'shipped_files'),
 }
 """What everybody may use: they use nothing but each other."""

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 import yaml
 
-from lathe_chatter.nodes.node_parameters import LATHE, MONITOR, PAGE, RECORDER, SUPERVISOR
+from lathe_chatter.nodes.parameter_tables import LATHE, MONITOR, PAGE, RECORDER, SUPERVISOR
 
 TABLES = {
     'lathe': LATHE,

@@ -19,7 +19,7 @@ from ear import Ear, ear
 from processes import LATHE, MONITOR, NODES, RECORDER, script
 from rosgraph_msgs.msg import Clock
 
-from lathe_chatter.nodes.joint_states import time_message
+from lathe_chatter.nodes.joint_state_message import time_message
 from lathe_chatter.recording import read_run, verify
 from lathe_chatter.recording.run_summary import SUMMARY
 

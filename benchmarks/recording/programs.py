@@ -16,7 +16,7 @@ from endings import by_mcap_core, count_by_mcap, count_by_rosbags
 from runs import scratch
 
 from lathe_chatter.recording import read_run, verify
-from lathe_chatter.recording.unfinished_counts import taken
+from lathe_chatter.recording.crash_safe_counters import taken
 
 _SAMPLES = 30
 """Messages of one topic that no other has before the samples."""

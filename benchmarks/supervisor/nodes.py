@@ -27,8 +27,8 @@ from trials import Trial, true_growth
 
 from lathe_chatter.lathe.config import LatheConfig
 from lathe_chatter.model.machine_and_sampling import LatheSetup
-from lathe_chatter.nodes.node_parameters import MONITOR
 from lathe_chatter.nodes.operator_node import parameter_arguments
+from lathe_chatter.nodes.parameter_tables import MONITOR
 from lathe_chatter.supervisor import Limits
 
 _PATIENCE, _ALARM, _AFTER = 120.0, 8.0, 10.0

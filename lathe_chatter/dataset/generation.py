@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from jinja2 import StrictUndefined, Template
 
+from lathe_chatter.code_identity import code_identity
 from lathe_chatter.dataset.file_formats import ENDINGS, Files, files_of, read_part
 from lathe_chatter.dataset.plan import Form, Plan
 from lathe_chatter.dataset.windows import Table, drawn_machine, unit_of, windows_of
 from lathe_chatter.errors import DatasetError, reason_of
 from lathe_chatter.executors import run_batches
-from lathe_chatter.fingerprint import code_identity
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.resumable_results import ResultFile

@@ -22,7 +22,7 @@ from lathe_chatter.samples import sample_columns
 from lathe_chatter.samples.columns import ACCELERATION_COLUMNS, UNITS
 from lathe_chatter.stability import safe_limit
 from lathe_chatter.stability.characteristic import Complex
-from lathe_chatter.stability.cuts_at_mean_force import operating_points
+from lathe_chatter.stability.stability_of_many_cuts import operating_points
 
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lathe_chatter.code_identity import code_identity
 from lathe_chatter.errors import ResultFileError
 from lathe_chatter.executors import run_batches
-from lathe_chatter.fingerprint import code_identity
 from lathe_chatter.knocks.knock_threshold import KnockLimit, Margin, smallest_lasting_knock
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut

@@ -20,8 +20,8 @@ from lathe_chatter.nodes.command_line_parameters import Own
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.node_main import make_executor, run_node
-from lathe_chatter.nodes.node_parameters import LATHE, MONITOR, RECORDER
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameter_tables import LATHE, MONITOR, RECORDER
 from lathe_chatter.nodes.real_time_loop import Served, ask_for_short_slices, spin_together
 from lathe_chatter.nodes.recorder_node import RecorderNode
 

@@ -26,7 +26,7 @@ from lathe_chatter.model.lathe_parameter_table import (
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes import simulation_control, simulation_services
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
-from lathe_chatter.nodes.joint_states import nanoseconds
+from lathe_chatter.nodes.joint_state_message import nanoseconds
 from lathe_chatter.nodes.lathe_diagnostics import TickStatistics
 from lathe_chatter.nodes.lathe_graph_watch import ClockWatch, PublisherWatch
 from lathe_chatter.nodes.lathe_log_and_record import LatheRecord

@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.nodes.joint_states import joint_states, time_message
+from lathe_chatter.nodes.joint_state_message import joint_states, time_message
 from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns

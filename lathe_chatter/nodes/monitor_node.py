@@ -33,8 +33,8 @@ from lathe_chatter.nodes.monitor_sentences import (
     withdrawn,
 )
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.node_parameters import MONITOR, ModelSource
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameter_tables import MONITOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.real_time_loop import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine

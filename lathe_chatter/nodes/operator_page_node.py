@@ -25,9 +25,9 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor, parse_change
 from lathe_chatter.nodes.diagnostics import DiagnosticsListener
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.node_parameters import PAGE
 from lathe_chatter.nodes.operator_page_cell import OperatedCell
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameter_tables import PAGE
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.page.server import FRAME_PERIOD, PageServer, Viewer
 from lathe_chatter.page.versioned_values import Board

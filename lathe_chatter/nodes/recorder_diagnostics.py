@@ -8,7 +8,7 @@ from pathlib import Path
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
-from lathe_chatter.recording.run_log import Discontinuity, RunLog
+from lathe_chatter.recording.recording_statistics import Discontinuity, RunLog
 from lathe_chatter.samples.continuity import BlockOrder
 
 

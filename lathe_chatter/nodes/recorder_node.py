@@ -15,15 +15,15 @@ from lathe_chatter.errors import LatheChatterError, RecordingFailedError, reason
 from lathe_chatter.nodes import recorder_services
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.node_parameters import RECORDER
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameter_tables import RECORDER
 from lathe_chatter.nodes.real_time_loop import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.nodes.recorder_diagnostics import news, recording_status
+from lathe_chatter.nodes.recorder_topic_selection import TopicWatch, selection
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.run_folders import RunFolders
 from lathe_chatter.nodes.simulation_control import Answer
-from lathe_chatter.nodes.topic_discovery import TopicWatch, selection
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence
 from lathe_chatter.recording.provenance import (
@@ -36,8 +36,8 @@ from lathe_chatter.recording.provenance import (
     parameter_values,
 )
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
+from lathe_chatter.recording.recording_statistics import RunLog
 from lathe_chatter.recording.ros_messages import LOG_TYPE
-from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.snapshot import SnapshotBuffer
 

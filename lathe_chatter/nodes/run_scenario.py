@@ -18,9 +18,9 @@ from lathe_chatter.errors import NodeFailedError, RunFailedError
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.nodes.end_signals import DeferredSignals
 from lathe_chatter.nodes.log_folder import ensure_log_folder
-from lathe_chatter.nodes.node_parameters import MONITOR, SUPERVISOR, ModelSource
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
+from lathe_chatter.nodes.parameter_tables import MONITOR, SUPERVISOR, ModelSource
 from lathe_chatter.page.server import answers, free_port, open_in_browser
 from lathe_chatter.scenario import Scenario
 

@@ -27,8 +27,8 @@ from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
-from lathe_chatter.nodes.node_parameters import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.parameter_node import ParameterNode
+from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for

@@ -1,7 +1,7 @@
 """The paper's Tables 2-4 and Figures 3-17, drawn again panel by panel.
 
-Each spans what the paper's own span, as far as its legible axes tell (findings.figure_window):
-5 turns at 3000 rev/min and 20 at 10000 rev/min.
+Each spans what the paper's own span, as far as its legible axes tell
+(`open_questions.figure_window`): 5 turns at 3000 rev/min and 20 at 10000 rev/min.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from lathe_chatter.model import BearingContact, Machine
 from lathe_chatter.paper.figures import WINDOWS
 from lathe_chatter.paper.published_runs import AXES, PAPER_RUNS, run_named
 from lathe_chatter.paper.reproduced_run import SAMPLE_RATE, paper_lathe
-from lathe_chatter.paper.screening_function_readings import (
+from lathe_chatter.paper.screening_function_variants import (
     ScreeningReading,
     axes_without_bearing,
     screening_readings,

@@ -13,7 +13,7 @@ from lathe_chatter.paper.figures import Picture, paper_pictures
 from lathe_chatter.paper.open_questions import Findings, StiffnessEffect, Window
 from lathe_chatter.paper.published_runs import PAPER_RUNS, run_named
 from lathe_chatter.paper.reproduced_run import AGREEMENT, Reproduced
-from lathe_chatter.paper.screening_function_readings import Reading
+from lathe_chatter.paper.screening_function_variants import Reading
 
 OVERVIEWS = (
     Picture('growth', 'Growth in time', 'Each run against the slope that its root gives it.'),

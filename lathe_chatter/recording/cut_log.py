@@ -1,7 +1,7 @@
 """What a lathe logged of its cuts: its sessions, and what happened in each of them.
 
-The one parser of the sentences of `cut_events`: the recorder follows them as they come, and who
-reads a run has them from `recorded_cuts`.
+The one parser of the sentences of `change_and_knock_sentences`: the recorder follows them as they
+come, and who reads a run has them from `recorded_cuts`.
 """
 
 from __future__ import annotations

@@ -7,13 +7,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from lathe_chatter.recording.crash_safe_counters import FILE_NAME as UNFINISHED
+from lathe_chatter.recording.crash_safe_counters import taken
 from lathe_chatter.recording.metadata_yaml import FILE_NAME
 from lathe_chatter.recording.provenance import ENDED_EARLY, IDENTITY, RECOVERED
 from lathe_chatter.recording.recorded_file import Note
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.split_file_writer import CLOSED
-from lathe_chatter.recording.unfinished_counts import FILE_NAME as UNFINISHED
-from lathe_chatter.recording.unfinished_counts import taken
 from lathe_chatter.recording.verification_result import Finding, Verification
 
 _STILL = 'The run is still being recorded: this is what is on disk of it.'

@@ -17,6 +17,7 @@ from lathe_chatter.recording.provenance import (
     identity,
     parameter_values,
 )
+from lathe_chatter.recording.recording_statistics import RunLog
 from lathe_chatter.recording.ros_messages import (
     LOG_TYPE,
     PARAMETER_EVENT_TYPE,
@@ -25,7 +26,6 @@ from lathe_chatter.recording.ros_messages import (
     parameters_bytes,
     topic_of_type,
 )
-from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns

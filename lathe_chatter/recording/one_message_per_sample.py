@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from lathe_chatter.array_types import Integers
+from lathe_chatter.recording.atomic_folder import atomic_folder
 from lathe_chatter.recording.export import Exported, ExportedParts, Progress
-from lathe_chatter.recording.folder_or_nothing import atomic_folder
 from lathe_chatter.recording.metadata_yaml import Topic
 from lathe_chatter.recording.recorded_file import Raw, offered_qos
 from lathe_chatter.recording.ros_messages import topic_of_type

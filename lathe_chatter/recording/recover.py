@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lathe_chatter.recording.atomic_folder import atomic_folder
 from lathe_chatter.recording.file_completeness import lost_at_the_end
-from lathe_chatter.recording.folder_or_nothing import atomic_folder
 from lathe_chatter.recording.mcap_chunk_walk import Damage
 from lathe_chatter.recording.metadata_yaml import Topic
 from lathe_chatter.recording.open_chunk import OpenChunk, record_bytes

@@ -186,7 +186,7 @@ class Run:
             ParameterError: If there is no such column, or they have several units.
             RunReadError: If a file is damaged, or the samples of several lathes are there.
         """
-        from lathe_chatter.recording.draw_samples import plot_run
+        from lathe_chatter.recording.plot_samples import plot_run
 
         return plot_run(self, columns, axes)
 

@@ -12,7 +12,7 @@ from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import cut_from, machine_from
 from lathe_chatter.recording.cut_log import CutSession
 from lathe_chatter.recording.provenance import ENDED_EARLY
-from lathe_chatter.recording.run_log import RunLog, SamplesReceived
+from lathe_chatter.recording.recording_statistics import RunLog, SamplesReceived
 from lathe_chatter.recording.run_writer import RunWriter
 
 SUMMARY = 'lathe_chatter/summary'

@@ -10,11 +10,11 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from lathe_chatter.errors import DiskFullError, RunExistsError
+from lathe_chatter.recording.crash_safe_counters import UnfinishedCounts
 from lathe_chatter.recording.disk_thread import DiskThread
 from lathe_chatter.recording.metadata_yaml import Topic
 from lathe_chatter.recording.open_chunk import Compression, OpenChunk
 from lathe_chatter.recording.split_file_writer import CLOSED, RunFiles, TopicTable
-from lathe_chatter.recording.unfinished_counts import UnfinishedCounts
 
 __all__ = ['CLOSED', 'DiskFullError', 'RunExistsError', 'RunWriter', 'Topic']
 

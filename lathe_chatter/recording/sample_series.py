@@ -105,7 +105,7 @@ class Samples(NamedTuple):
         Raises:
             ParameterError: If there is no such column, or they have several units.
         """
-        from lathe_chatter.recording.draw_samples import plot_samples
+        from lathe_chatter.recording.plot_samples import plot_samples
 
         return plot_samples(self, columns, axes)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lathe_chatter.recording.metadata_yaml import Topic
-from lathe_chatter.recording.run_log import RunLog
+from lathe_chatter.recording.recording_statistics import RunLog
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 

@@ -27,7 +27,7 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import Change, parse_change
 from lathe_chatter.model import BearingContact, Cut
-from lathe_chatter.nodes.joint_states import joint_states
+from lathe_chatter.nodes.joint_state_message import joint_states
 from lathe_chatter.nodes.lathe_diagnostics import FLOOD
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.simulation_control import RunState

@@ -16,7 +16,7 @@ from support.node_bench import LATCHED, Bench
 from support.node_processes import NODES
 
 from lathe_chatter.nodes import entry_points
-from lathe_chatter.nodes.node_parameters import MONITOR as TABLE
+from lathe_chatter.nodes.parameter_tables import MONITOR as TABLE
 from lathe_chatter.precompile import precompile
 
 LATHE, MONITOR = 'lathe', 'chatter_monitor'

@@ -13,8 +13,8 @@ from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING, change_sen
 from lathe_chatter.model import Cut
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
+from lathe_chatter.recording.recording_statistics import RunLog
 from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes
-from lathe_chatter.recording.run_log import RunLog
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 

@@ -19,8 +19,8 @@ from lathe_chatter.model.lathe_parameter_table import (
     samples_per_tick,
 )
 from lathe_chatter.model.parameter_table import Row
-from lathe_chatter.nodes.node_parameters import MONITOR
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
+from lathe_chatter.nodes.parameter_tables import MONITOR
 
 CONTRACT = {
     'spindle_speed_rpm': (3000.0, 'rev/min', True),

@@ -10,7 +10,7 @@ from lathe_chatter.paper.figures import WINDOWS
 from lathe_chatter.paper.open_questions import coefficient_range
 from lathe_chatter.paper.published_runs import run_named
 from lathe_chatter.paper.reproduced_run import paper_lathe
-from lathe_chatter.paper.screening_function_readings import (
+from lathe_chatter.paper.screening_function_variants import (
     Reading,
     ScreeningReading,
     axes_without_bearing,

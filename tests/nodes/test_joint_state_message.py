@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.nodes.joint_states import joint_states, nanoseconds, time_message
+from lathe_chatter.nodes.joint_state_message import joint_states, nanoseconds, time_message
 
 
 def block(rows: int, width: int, seed: int = 0) -> Array:

@@ -12,7 +12,7 @@ import pytest
 from support.recorded import number, topic
 
 from lathe_chatter.recording import RunWriter, recover, verify
-from lathe_chatter.recording.unfinished_counts import FILE_NAME, UnfinishedCounts, taken
+from lathe_chatter.recording.crash_safe_counters import FILE_NAME, UnfinishedCounts, taken
 
 TESTS = Path(__file__).resolve().parents[1]
 CHILD = """
