@@ -243,6 +243,18 @@ def follow_push(state: DetectorState, products: Records, newest: int) -> None:
 
 
 @compiled(borrows=True, inner=True)
+def follow_breaks(now: Any, products: Any, settings: Any) -> None:
+    """Notice that the tool may leave the cut, where no C w tells its force, until that is over."""
+    if products.outputs >= 2.0 and now.alarmed == 0:
+        pulsation = 2.0 / settings.gain * math.sqrt(products.force_force / products.outputs)
+        if now.push > 0.0 and pulsation > settings.tool_stiffness * now.push:
+            now.since_break = 0
+            return
+    if now.since_break > 0 or now.holding == 0:
+        now.since_break += 1
+
+
+@compiled(borrows=True, inner=True)
 def follow_misfit(state: DetectorState, products: Any, clear: bool) -> None:
     """What the force usually differs by from C w h, while nothing happens."""
     now = state.now[0]

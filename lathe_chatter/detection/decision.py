@@ -20,6 +20,7 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.baseline import (
     ARMED,
     SETTLING,
+    follow_breaks,
     follow_energy,
     follow_lines,
     follow_misfit,
@@ -37,7 +38,12 @@ from lathe_chatter.detection.detector_state import (
     DetectorState,
 )
 from lathe_chatter.detection.filter_design import Complex
-from lathe_chatter.detection.reported_figures import is_cutting, state_of, write_figures
+from lathe_chatter.detection.reported_figures import (
+    is_cutting,
+    shown_amplitude,
+    state_of,
+    write_figures,
+)
 from lathe_chatter.detection.signal_conditioning import PHASE_SEEN
 from lathe_chatter.detection.structured_arrays import Records
 
@@ -81,7 +87,9 @@ _RAISED = 1.5
 
 _OFF_PHASE, _ON_PHASE = 0.2, 0.9
 """Once-per-turn variance over all: below the spindle's own vibration, above chatter."""
-_OUT_OF_CUT = 0.9
+_OUT_OF_CUT, _LASTS = 0.9, 0.7
+"""Force over its mean, and energy over that of 16 hops before, of chatter that has grown as far as
+the tool leaves the cut."""
 _STEADY, _SHORT, _STEADIER = 0.12, 32, 0.1
 """Spread of the energy over its mean, over all hops that are remembered and over so many, that is
 steady: noise in a mode has several times as much."""
@@ -222,15 +230,19 @@ def _saturated(
     if not now.once_per_turn > _ON_PHASE:
         return False
     if stiff > 0.0 and now.hops_seen >= HOPS:
-        mean = power = count = 0.0
+        mean = power = count = lately = before = 0.0
         for back in range(16):
             hop = products[(newest - back) % HOPS]
             mean -= stiff * hop.tool_mean / 16.0
             power += hop.force_force
             count += hop.outputs
+            lately += abs(state.motion[(newest - back) % HOPS, strongest]) ** 2
+            before += abs(state.motion[(newest - back - 16) % HOPS, strongest]) ** 2
         pulsation = 2.0 * math.sqrt(power / max(count, 1.0))
         usual = now.usual_misfit if now.usual_misfit == now.usual_misfit else 0.0
-        if pulsation > _OUT_OF_CUT * mean and mean > 10.0 * math.sqrt(usual):
+        # After a knock the tool leaves the cut as well, and less and less.
+        lasts = lately > _LASTS * before
+        if lasts and pulsation > _OUT_OF_CUT * mean and mean > 10.0 * math.sqrt(usual):
             return True
     limit = _STEADIER if length == _SHORT else _STEADY
     total = squares = 0.0
@@ -271,6 +283,7 @@ def _decide(
     now.calm = now.calm + 1 if down else 0
     if now.calm >= _CALM:
         now.alarmed = now.saturated = now.by_line = 0
+        now.since_break = 0
         restart_baseline(state)
 
 
@@ -300,6 +313,8 @@ def judge(
     by_itself = settings.has_machine == 0 and now.strictness < np.inf
     # Without a baseline the growth rate would be alone, and what dies down into noise has any.
     unchecked = model and (settings.believed == UNCHECKED or now.rise != now.rise)
+    # Nor is every force one of the cut where the tool may leave it.
+    unchecked = unchecked or (model and now.since_break == 0)
     if settings.has_machine == 0:
         loudest = follow_lines(state, newest)
         if by_itself:  # chatter that the baseline holds has risen no more than anything else
@@ -335,6 +350,7 @@ def judge(
     state.amplitudes[newest] = amplitude
     follow_push(state, products, newest)
     if model:
+        follow_breaks(now, products[newest], settings)
         follow_misfit(state, products[newest], windows[_TRUSTED].clearness > 0.5)
     known = now.ramping == 0 and now.hops_seen > SETTLING
     forced = (
@@ -365,5 +381,6 @@ def judge(
         now.saturated = now.saturated + 1 if steady else 0
     _decide(state, amplitude, recent, by_itself)
     write_figures(state, windows, wave, model, amplitude)
+    now.shown_amplitude = shown_amplitude(now, products, settings, omega, speed)
     cutting = is_cutting(now, windows[WINDOWS.size - 1], products, settings)
     now.state = state_of(state, cutting, forced)

@@ -266,7 +266,7 @@ class ChatterDetector:
             bearing = self._machine.bearing_stiffness
             engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
         if self._mixed:  # neither metres nor a growth rate that is one body's
-            now |= dict.fromkeys(('growth', 'growth_error', 'amplitude'), math.nan)
+            now |= dict.fromkeys(('growth', 'growth_error', 'shown_amplitude'), math.nan)
         return Estimate(
             time,
             STATES[now['state']],
@@ -275,7 +275,7 @@ class ChatterDetector:
             now['growth'],
             now['growth_error'],
             now['omega'] / _TURN,
-            now['amplitude'],
+            now['shown_amplitude'],
             judge.speed * 60.0 if mode.sees_spindle else math.nan,
             now['cutting'],
             stiffness,

@@ -30,14 +30,14 @@ SERIOUSNESS = (1, 2, 4, 5, 3, 0)
 _NOW = record_type(
     """
     usual_misfit misfits_seen peak_amplitude push score rise once_per_turn spread
-    synchronous_amplitude smallest_amplitude strictness amplitude
+    synchronous_amplitude smallest_amplitude strictness amplitude shown_amplitude
     root_cutting root_stiffness
     growth growth_error omega cutting cutting_error stiffness
     """,
     """
     newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
     block_fill saturated stepped hold_ended
-    fit_hops fit_is_due by_line line_gone strongest
+    fit_hops fit_is_due by_line line_gone strongest since_break
     """,
     'root deeper_root',
 )
@@ -47,8 +47,9 @@ class DetectorState(NamedTuple):
     """What the judgement remembers, changed in place.
 
     Attributes:
-        now: One record. Figures that are handed out: `growth` to `stiffness`, `amplitude`,
-            `once_per_turn`, `score`. `newest`: place of the newest hop in the rings. `root`,
+        now: One record. Figures that are handed out: `growth` to `stiffness`,
+            `shown_amplitude`, `once_per_turn`, `score`. `newest`: place of the newest hop in the
+            rings. `since_break`: hops since the tool may last have left the cut. `root`,
             `deeper_root`: rightmost roots of a cut like the present one, and of a deeper one.
         motion: Resonators at the ends of the last hops, as a ring (HOPS, bins).
         usual: Mean product with the hop before, mean square, mean square innovation

@@ -40,6 +40,8 @@ _CLEAR = 0.4
 _DEEPER = 1.3
 """Times the identified C w: the cut whose rightmost root is followed too."""
 _NOISE_HOPS = 32
+_RENEWED = 20.0
+"""Turns after which the means over turns are those of a cut that the tool had left."""
 _FIT_AFTER, _FIT_HOPS = 100, 250
 """Hops until the means over turns have settled, and in a block of the fit of the machine."""
 
@@ -130,6 +132,9 @@ def take_hops(
         done += 1
         between = 1 <= now.holding <= 2 or now.ramping != 0
         between = between or (now.alarmed != 0 and settings.believed != UNCHECKED)
+        between = between or now.since_break * settings.period * state.speeds[0] < _RENEWED
+        if now.since_break == 0:
+            memory.counts[0].first_angle = samples[0, 0]
         seen = now.amplitude > now.smallest_amplitude  # roundings fit no machine
         take_hop(memory.fit, seen and not between and now.hops_seen > _FIT_AFTER)
         newest = (now.newest + 1) % HOPS
@@ -159,6 +164,7 @@ def take_hops(
             identify(products, newest, lengths, mechanics, noise, 1.0 / speed, now, total, windows)
             if now.hops_seen % _ROOT_EVERY == 0 or 0 < now.holding <= _NEW_CUT:
                 _follow_roots(now, windows, mechanics, speed)
+        was_alarmed = now.alarmed != 0
         if settings.has_machine == 0:
             alone = abs(memory.resonators[now.strongest])
             alone *= 1.0 - abs(kernels.poles[now.strongest])
@@ -166,7 +172,8 @@ def take_hops(
         _powers(products, newest, plain)
         judge(state, settings, products, windows, plain, memory.phases, turns, centres, speed)
         now.fit_hops += 1
-        if settings.has_machine != 0 and (now.fit_hops >= _FIT_HOPS or now.holding == 1):
+        another = now.holding == 1 or (was_alarmed and now.alarmed == 0)
+        if settings.has_machine != 0 and (now.fit_hops >= _FIT_HOPS or another):
             now.fit_hops, now.fit_is_due = 0, 1
             break
         if now.alarmed != 0 and now.since_alarm <= 64:

@@ -239,7 +239,8 @@ class BandDetector:
             )
             if now['fit_is_due']:
                 now.fit_is_due = 0
-                self.fit.close_block(self._memory.fit, jumped=bool(now.holding))
+                another = bool(now.holding or now.since_break == 0)
+                self.fit.close_block(self._memory.fit, jumped=another)
                 self._weigh_machine()
                 self.margin = self._new_margin()
             if not now['alarmed']:

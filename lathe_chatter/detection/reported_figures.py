@@ -20,6 +20,7 @@ from lathe_chatter.detection.detector_state import (
     WINDOWS,
     DetectorState,
 )
+from lathe_chatter.detection.signal_conditioning import mean_kept
 from lathe_chatter.detection.structured_arrays import Records
 
 _WATCH = 0.75
@@ -31,6 +32,8 @@ _NO_PUSH, _DOUBT = 0.25, 2.0
 """Of the mean push that there was: less is none; standard errors by which it has to be less."""
 _FORGOTTEN = 0.94
 """Of a larger push, per hop: what falls more slowly is the drift of a sensor, no end of a cut."""
+_LEFT, _LEFT_OF_CHATTER, _SHOWN = 0.5, 0.1, 4
+"""Part that must be left of a vibration that is not the spindle's own; hops that are shown."""
 _HEARD, _SURE, _NEXT_TO_NOTHING = 0.15, 3.0, 0.005
 """Part of the signal that is no noise; standard errors; C w over the stiffness of the tool."""
 
@@ -79,6 +82,36 @@ def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
     if forced:
         return FORCED
     return STABLE
+
+
+@compiled(borrows=True, inner=True)
+def shown_amplitude(
+    now: Any, products: Records, settings: Any, omega: float, speed: float
+) -> float:
+    """Of the tool's vibration, m; nan where too much of it may be the spindle's own.
+
+    With a machine the tool's motion is freed of its mean over turns, and just after that has begun
+    anew of the motion of a turn before, as it is without one: of a vibration that almost repeats
+    itself turn after turn little is left then.
+    """
+    if settings.has_machine == 0 or settings.has_angle == 0:
+        keep = 0.0
+    else:
+        keep = mean_kept(now.since_break * settings.period * speed)
+    left = 1.0
+    if settings.has_angle != 0:
+        cosine = math.cos(omega / speed)
+        left = math.sqrt(2.0 * (1.0 - cosine) / (1.0 - 2.0 * keep * cosine + keep**2))
+    # Chatter is one line, of which that tells how much is left.
+    if not (left > _LEFT or (now.alarmed != 0 and left > _LEFT_OF_CHATTER)):
+        return np.nan
+    power = count = 0.0
+    for back in range(_SHOWN):
+        hop = products[(now.newest - back) % HOPS]
+        power += hop.tool_power if settings.has_machine == 0 else hop.free_power
+        count += hop.outputs
+    amplitude: float = 2.0 / left / settings.gain * math.sqrt(power / max(count, 1.0))
+    return amplitude
 
 
 @compiled(borrows=True, inner=True)

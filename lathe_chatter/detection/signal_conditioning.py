@@ -33,11 +33,12 @@ what is free of its mean hold, samples since an output."""
 HOP_SUMS = record_type(
     """
     force_force force_chip chip_chip pull_pull pull_workpiece workpiece_workpiece tool_power
-    outputs tool_noise workpiece_noise tool_mean
+    free_power outputs tool_noise workpiece_noise tool_mean
     """
 )
 """Sums over the outputs of one hop: force F, chip h, the changes u of workpiece and tool over a
-turn, pull F - m x'' - c x' = k x; third differences of the raw samples; mean of the tool."""
+turn, pull F - m x'' - c x' = k x; the tool free of its mean at every spindle angle; third
+differences of the raw samples; mean of the tool."""
 
 PHASES = 8
 """Spindle angles at which a value is taken once a turn."""
@@ -118,6 +119,13 @@ def _make_room(history: Array, counts: Any) -> None:
     counts.free_from = max(counts.free_from - shift, 0)
 
 
+@compiled(inner=True)
+def mean_kept(turns: float) -> float:
+    """What a turn leaves of the mean at a spindle angle, some turns after it has begun."""
+    part = min(turns * _TURN_SHARE, 1.0)
+    return (1.0 - _TURN_SHARE) * part * part * (3.0 - 2.0 * part)
+
+
 @compiled(borrows=True, inner=True)
 def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     """Fill in the changes over a turn of the newest thinned sample; whether there are any."""
@@ -146,8 +154,7 @@ def _take_changes(history: Array, counts: Any, settings: Any) -> bool:
     elif settings.has_machine != 0:
         # x less its mean over turns: y = x - x(t - tau) + keep y(t - tau). That there was nothing
         # before the first sample must not echo, so the mean begins with one turn.
-        part = min((angles[n] - counts.first_angle) * _TURN_SHARE, 1.0)
-        keep = (1.0 - _TURN_SHARE) * part * part * (3.0 - 2.0 * part)
+        keep = mean_kept(angles[n] - counts.first_angle)
         history[TOOL_FREE, n] = tool + keep * _interpolated(history[TOOL_FREE], p, x)
         before = history[CHIP, n] - _interpolated(history[CHIP], p, x)
         history[CHIP_FREE, n] = before + keep * _interpolated(history[CHIP_FREE], p, x)
@@ -202,6 +209,7 @@ def _take_products(
     products.pull_workpiece += pull.real * place.real + pull.imag * place.imag
     products.workpiece_workpiece += place.real**2 + place.imag**2
     products.tool_power += tool.real**2 + tool.imag**2
+    products.free_power += free.real**2 + free.imag**2
     add_output(fit, force, slope, free, place, chip)
 
 
@@ -210,7 +218,7 @@ def clear(sums: Any) -> None:
     """All 0."""
     sums.force_force = sums.force_chip = sums.chip_chip = 0.0
     sums.pull_pull = sums.pull_workpiece = sums.workpiece_workpiece = 0.0
-    sums.tool_power = sums.outputs = sums.tool_mean = 0.0
+    sums.tool_power = sums.free_power = sums.outputs = sums.tool_mean = 0.0
     sums.tool_noise = sums.workpiece_noise = 0.0
 
 
