@@ -35,4 +35,4 @@ axes[1].set_xlabel('time / s')
 for axis in axes:
     axis.fill_between(times, 0, 1, flagged, transform=axis.get_xaxis_transform(), alpha=0.2)
 print(estimate.advice.in_words())
-plt.show()
+lc.show_figure('detector')

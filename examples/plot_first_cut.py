@@ -19,4 +19,4 @@ for axis, depth in zip(axes, (0.0005, 0.001)):
     axis.set_ylabel('tool / um')
     axis.set_title(f'{depth * 1e3:.1f} mm deep', loc='left')
 axes[-1].set_xlabel('time / s')
-plt.show()
+lc.show_figure('first_cut')

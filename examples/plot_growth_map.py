@@ -24,4 +24,4 @@ axes.contour(speeds, depths * 1e3, growth.growth_rate, levels=[0.0], colors='bla
 figure.colorbar(mesh, label='growth rate / (1/s)')
 axes.set_xlabel('spindle speed / (rev/min)')
 axes.set_ylabel('depth of cut / mm')
-plt.show()
+lc.show_figure('growth_map')

@@ -21,4 +21,4 @@ for axis, impulse in zip(axes, (0.0006, 0.002)):
     axis.set_title(f'a knock of {impulse * 1e3:g} mN s', loc='left')
     axis.set_ylabel('tool / um')
 axes[-1].set_xlabel('time / s')
-plt.show()
+lc.show_figure('knock')

@@ -17,4 +17,4 @@ for seated in (False, True):
     limit = lc.critical_depth(lc.Machine(), 3000.0, seated=seated)
     name = 'seated' if seated else 'open'
     print(f'{name}: {limit * 1e3:.4f} mm at 3000 rev/min')
-plt.show()
+lc.show_figure('lobes')

@@ -25,4 +25,4 @@ axes.axvline(limit * 1e3, linestyle='--', label='limit by the characteristic equ
 axes.set_xlabel('depth of cut / mm')
 axes.set_ylabel('tool, once in every turn / um')
 axes.legend()
-plt.show()
+lc.show_figure('many_lathes')

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from lathe_chatter.lathe.state import LatheState
     from lathe_chatter.model import BearingContact, Cut, Machine, Mode
     from lathe_chatter.model.machine_file import MachineDescription, load_machine
+    from lathe_chatter.plot_style import show_figure
     from lathe_chatter.recording import Run, RunWriter, Samples, read_run
     from lathe_chatter.recording.recover import recover
     from lathe_chatter.recording.resimulate import resimulate
@@ -84,6 +85,7 @@ __all__ = [
     'rightmost_root',
     'rightmost_roots',
     'safe_limit',
+    'show_figure',
     'simulate',
     'smallest_lasting_knock',
     'stability_probability',
@@ -103,6 +105,7 @@ _MODULES = {
     'lathe.many_lathes': ('LatheSweep',),
     'model': ('BearingContact', 'Cut', 'Machine', 'Mode'),
     'model.machine_file': ('MachineDescription', 'load_machine'),
+    'plot_style': ('show_figure',),
     'recording': ('Run', 'RunWriter', 'Samples', 'read_run', 'recover', 'resimulate', 'verify'),
     'report.stability_chart': ('plot_lobes',),
     'scenario': ('Scenario', 'load_scenario'),

@@ -31,6 +31,8 @@ _UNSAID = {
 }
 """What a file would tell of when and with what it was made."""
 _DPI = 110
+_WITHOUT_SCREEN = {'agg', 'cairo', 'pdf', 'pgf', 'ps', 'svg', 'template'}
+"""Matplotlib's backends that show nothing."""
 
 
 class Scale(NamedTuple):
@@ -92,6 +94,22 @@ def axes_or_new(axes: Axes | None) -> Axes:
 
     made: Axes = plt.subplots(layout='constrained')[1]
     return made
+
+
+def show_figure(name: str) -> None:
+    """Show pyplot's newest figure; where there is no screen, write it and say where it is.
+
+    Args:
+        name: Of the file, which is a PNG in the folder where one is.
+    """
+    from matplotlib import pyplot as plt
+
+    if plt.get_backend().lower() not in _WITHOUT_SCREEN:
+        plt.show()
+        return
+    file = Path(f'{name}.png').absolute()
+    plt.savefig(file)
+    print(f'There is no screen here: the picture is in {file}')  # noqa: T201 -- for scripts
 
 
 def save(figure: Figure, path: Path) -> None:

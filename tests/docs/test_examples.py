@@ -8,6 +8,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import pytest
+from matplotlib import image
 from support.page_blocks import ROOT
 
 SCRIPTS = sorted((ROOT / 'examples').glob('plot_*.py'))
@@ -25,11 +26,21 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.parametrize('script', SCRIPTS, ids=lambda script: script.stem)
-def test_an_example_runs_and_draws(script: Path, figures: Any) -> None:
+def test_an_example_runs_and_leaves_its_picture_where_there_is_no_screen(
+    script: Path,
+    figures: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
     lines = script.read_text(encoding='utf-8').splitlines()
     assert 20 <= len(lines) <= 60
     exec(compile('\n'.join(lines), str(script), 'exec'), {'__name__': '__main__'})  # noqa: S102 -- ours
     assert figures()
+    picture = tmp_path / f'{script.stem.removeprefix("plot_")}.png'
+    assert image.imread(picture).std() > 0.05
+    assert f'the picture is in {picture}\n' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize('notebook', NOTEBOOKS, ids=lambda notebook: notebook.stem)
