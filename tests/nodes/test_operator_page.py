@@ -271,6 +271,31 @@ def test_it_fits_the_screen_and_axe_has_nothing_to_say(
     assert found == []
 
 
+def test_legends_follow_the_theme(browser: Browser) -> None:
+    browser.until('plots.get("chart") && plots.get("displacement-0")', 'chart and signals')
+    marks = 'document.querySelectorAll("main .u-series:not(:first-child) .u-marker")'
+    seen = []
+    try:
+        for dark in (False, True):
+            browser.resize(1280, dark=dark)
+            browser.until(
+                f'matchMedia("(prefers-color-scheme: dark)").matches === {str(dark).lower()}', ''
+            )
+            browser.until('colours.has("tool")', 'drawn anew')
+            tool = browser.run(
+                '(e => { e.style.color = css("tool"); document.body.append(e); '
+                'const c = getComputedStyle(e).color; e.remove(); return c; })'
+                '(document.createElement("i"))'
+            )
+            found = browser.run(f'[...{marks}].map(e => getComputedStyle(e).borderTopColor)')
+            assert tool in found
+            seen.append(found)
+    finally:
+        browser.resize(1280)
+    assert len(seen[0]) == len(seen[1])
+    assert all(light != dark for light, dark in zip(*seen, strict=True))
+
+
 def test_a_killed_lathe_is_told_and_is_back_by_itself(page: Page, browser: Browser) -> None:
     page.kill('lathe')
     browser.until('document.querySelector("#gone").textContent.includes("/lathe is silent")', '')

@@ -14,6 +14,12 @@ function css(name) {
   return colours.get(name);
 }
 
+// A legend is no canvas: its marks take the colours of the style sheet, of whatever theme, by themselves.
+function legend(names) {
+  const mark = (u, k) => `var(--${names[k - 1]})`;
+  return {show: true, live: false, markers: {stroke: mark, fill: () => 'transparent'}};
+}
+
 function axis(label, more) {
   return {
     label, stroke: () => css('ink'), grid: {stroke: () => css('grid'), width: 1},
@@ -79,7 +85,7 @@ function drawSignals(id, what, times, values, height, onSelect) {
   const unit = what === 'displacement' ? 'µm' : 'mm/s';
   const line = (label, colour) => ({label, stroke: () => css(colour), width: 1, points: {show: false}});
   const u = plot(id, height, () => ({
-    height, legend: {show: true, live: false},
+    height, legend: legend(['tool', 'workpiece']),
     series: [{}, line('tool', 'tool'), line('workpiece', 'workpiece')],
     scales: {x: {time: false}, y: {range: room(factor * (what === 'displacement' ? 1e-8 : 1e-5))}},
     axes: [axis('simulated time / s'), axis(height < 150 ? unit : `${what} / ${unit.includes('/') ? `(${unit})` : unit}`, {side: 3})],
@@ -229,7 +235,7 @@ function drawChart(chart, point, trail, recommended, alarmed) {
   const data = same ? null : [chart.speed, ...shown.map(([name]) =>
     chart[name].map(v => (v == null ? 10 * top : Math.min(v * MILLI, 10 * top))))];
   plot('chart', chart, () => ({
-    height: 320, legend: {show: true, live: false},
+    height: 320, legend: legend(shown.map(([, , colour]) => colour)),
     scales: {x: {time: false, range: () => [chart.speed[0], chart.speed[chart.speed.length - 1]]},
       y: {range: u => [0, u.top]}},
     axes: [axis('spindle speed / (rev/min)'), axis('depth of cut / mm', {side: 3})],
