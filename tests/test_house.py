@@ -53,7 +53,7 @@ ARROWS = {
     'gym_environment': {'model', 'samples', 'lathe', 'detection'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},
     'paper': {'model', 'samples', 'lathe', 'stability', 'report'},
-    'page': {'model', 'samples', 'lathe', 'stability', 'recording', 'report'},
+    'page': {'model', 'samples', 'stability', 'recording', 'report'},
     'nodes': {
         *('model', 'samples', 'lathe', 'detection', 'supervisor', 'recording', 'scenario'),
         'precompile',

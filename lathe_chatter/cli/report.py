@@ -12,12 +12,11 @@ from lathe_chatter.cli.common_options import add_json, add_run
 from lathe_chatter.cli.console import Screen, counted, writing
 from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
-from lathe_chatter.plot_style import text_of
 from lathe_chatter.report.operating_points import probabilities_of
 from lathe_chatter.report.probability_chart import cut_probability, probability_sentence
 from lathe_chatter.report.run_excerpts import Excerpt, excerpts_of
 from lathe_chatter.report.run_figure import draw_run
-from lathe_chatter.report.run_history import History, read_history
+from lathe_chatter.report.run_history import Flag, History, Session, in_words, read_history
 from lathe_chatter.stability import root_of
 
 EXAMPLE = 'lathe-chatter report runs/20260401-120000'
@@ -142,32 +141,25 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
     # The start itself has no sample.
     begin, word = (0.0, 'start') if history.begin < _LATE else (history.begin, 'record begins')
     result = [_entry(history, begin, f'{word}: {_cut_text(history.cut_at(begin))}')]
-    for session in history.later_sessions:
-        cut = _cut_text(session.start) if session.known else 'with what is not in the record'
-        result.append(_entry(history, session.time, f'{session.why}: {cut}'))
-    for change in history.changes:
-        words = ', '.join(on_the_shop_floor(*changed) for changed in change.new.items())
-        result.append(_entry(history, change.time, words))
+    spans = history.chatter_spans()
+    for event in history.in_order():
+        entry = _entry(history, event.time, in_words(event))
+        if isinstance(event, Session):
+            cut = _cut_text(event.start) if event.known else 'with what is not in the record'
+            entry['what'] += f': {cut}'
+        if isinstance(event, Flag) and event.chatter:
+            ends = [end for start, end in spans if start == event.time]
+            ends += [change.time for change in history.changes if change.time > event.time]
+            until = min(ends, default=event.time)  # what comes after is another cut
+            for name in ('frequency', 'growth_rate'):
+                settled = history.settled(name, event.time, until)
+                entry[name] = settled if math.isfinite(settled) else getattr(event, name)
+        result.append(entry)
     result += [
         _entry(history, ramp.end, f'the spindle is at {ramp.high:g} rev/min')
         for ramp in history.ramps
         if ramp.start < ramp.end <= history.duration
     ]
-    result += [
-        _entry(history, knock.time, f'knock, {text_of(knock.impulse, "N s")}')
-        for knock in history.knocks
-    ]
-    spans = history.chatter_spans()
-    for flag in history.flags:
-        entry = _entry(history, flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
-        if flag.chatter:
-            ends = [end for start, end in spans if start == flag.time]
-            ends += [change.time for change in history.changes if change.time > flag.time]
-            until = min(ends, default=flag.time)  # what comes after is another cut
-            for name in ('frequency', 'growth_rate'):
-                settled = history.settled(name, flag.time, until)
-                entry[name] = settled if math.isfinite(settled) else getattr(flag, name)
-        result.append(entry)
     result += [
         _entry(history, time, f'advice: {speed:.0f} rev/min') for time, speed in _advice(history)
     ]

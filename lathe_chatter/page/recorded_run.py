@@ -16,7 +16,6 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
 from lathe_chatter.page.stability_chart import draw_chart
@@ -26,7 +25,7 @@ from lathe_chatter.recording.chunk_messages import messages_of
 from lathe_chatter.recording.mcap_chunk_walk import Chunk, record_at
 from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.report.operating_points import stays_of
-from lathe_chatter.report.run_history import History, read_history, value_near
+from lathe_chatter.report.run_history import History, in_words, read_history, value_near
 from lathe_chatter.samples.codec import SampleDecoder
 
 COLUMNS = ('time', 'spindle_angle', *SIGNALS)
@@ -264,16 +263,8 @@ class RecordedRun:
 
     def _show_history(self, history: History) -> None:
         """What happened, in order."""
-        found = [(session.time, session.why) for session in history.later_sessions]
-        for change in history.changes:
-            words = ', '.join(on_the_shop_floor(*each) for each in change.new.items())
-            found.append((change.time, words))
-        found += [(knock.time, f'knock, {knock.impulse * 1e3:g} mN s') for knock in history.knocks]
-        found += [
-            (flag.time, 'chatter flagged' if flag.chatter else 'flag cleared')
-            for flag in history.flags
-        ]
-        self._board.put('events', [list(event) for event in sorted(found)])
+        found = [[event.time, in_words(event)] for event in history.in_order()]
+        self._board.put('events', [*found, [history.duration, 'the record ends']])
         self._board.put('flags', history.chatter_spans())
         points = [(stay.start, stay.cut) for stay in stays_of(history)]
         self._board.put('path', [[t, c.spindle_speed_rpm, c.depth_of_cut] for t, c in points])

@@ -22,10 +22,12 @@ from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING_AGAIN,
     Change,
     Knock,
+    on_the_shop_floor,
 )
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription
+from lathe_chatter.plot_style import text_of
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, message_of, recorded_cuts
@@ -81,6 +83,7 @@ class Session(NamedTuple):
         spindle_acceleration: rev/min per s; 0 where the speed steps.
         known: Whether the record has its parameters; else they are those of the one before.
         described: The machine file that it was given, None where there was none.
+        ended: What happened at the very end of the one before, and so at the same time.
     """
 
     time: float
@@ -91,6 +94,7 @@ class Session(NamedTuple):
     spindle_acceleration: float
     known: bool
     described: MachineDescription | None = None
+    ended: tuple[Change | Knock, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,15 @@ class History:
             self.known, self.described,
         )  # fmt: skip
         return (first, *self.later_sessions)
+
+    def in_order(self) -> list[Session | Change | Knock | Flag]:
+        """What happened after the start, as it happened."""
+        at_ends = [event for session in self.later_sessions for event in session.ended]
+        found: list[Session | Change | Knock | Flag] = [*at_ends, *self.later_sessions]
+        found += (change for change in self.changes if change not in at_ends)
+        found += (knock for knock in self.knocks if knock not in at_ends)
+        found += self.flags
+        return sorted(found, key=lambda each: each.time)
 
     def session_at(self, time: float) -> Session:
         """The session in which a time is, s."""
@@ -220,6 +233,17 @@ class History:
         return spans
 
 
+def in_words(event: Session | Change | Knock | Flag) -> str:
+    """What happened, for a table or a list."""
+    if isinstance(event, Session):
+        return event.why
+    if isinstance(event, Change):
+        return ', '.join(on_the_shop_floor(*changed) for changed in event.new.items())
+    if isinstance(event, Knock):
+        return f'knock, {text_of(event.impulse, "N s")}'
+    return 'chatter flagged' if event.chatter else 'flag cleared'
+
+
 def _cut_short(ramp: Ramp, time: float) -> Ramp:
     """A ramp that ends before it has reached its speed."""
     share = (time - ramp.start) / (ramp.end - ramp.start)
@@ -240,11 +264,15 @@ def read_history(path: Path) -> History:
     sessions = _sessions(cuts)
     dated = _Dated(cuts, sessions)
     estimates = {name: dated.series(name) for name in _ESTIMATES}
-    events = [
-        replace(event, time=event.time + session.time)
+    told = [
+        [replace(event, time=event.time + session.time) for event in recorded.events]
         for session, recorded in zip(sessions, cuts.sampled, strict=True)
-        for event in recorded.events
     ]
+    later = (
+        session._replace(ended=tuple(event for event in before if event.time >= session.time))
+        for session, before in zip(sessions[1:], told[:-1], strict=True)
+    )
+    events = [event for each in told for event in each]
     first = sessions[0]
     return History(
         path=Path(path),
@@ -257,7 +285,7 @@ def read_history(path: Path) -> History:
         estimates=estimates,
         tool_leaves_cut=first.tool_leaves_cut,
         spindle_acceleration=first.spindle_acceleration,
-        later_sessions=tuple(sessions[1:]),
+        later_sessions=tuple(later),
         known=first.known,
         described=first.described,
         remarks=_remarks(cuts),

@@ -97,6 +97,15 @@ def test_a_moment_has_the_cut_the_flag_and_the_frequency_of_then(run: Path) -> N
     assert before['closeup']['depth'] == 0.0005
 
 
+def test_the_list_of_what_happened_goes_to_the_end_of_the_record(run: Path) -> None:
+    shown = RecordedRun(run)
+    asyncio.run(shown.read())
+    events = look(shown, do='at', time=4.1)[0]['page']['events']
+    assert [time for time, _ in events] == sorted(time for time, _ in events)
+    assert 'chatter flagged' in [text for _, text in events]
+    assert events[-1] == [pytest.approx(12.0), 'the record ends']
+
+
 def test_sessions_follow_each_other_and_what_is_missing_stays_open(tmp_path: Path) -> None:
     config = recorded_config({})
     with LatheRun(tmp_path / 'run', parameters_of(config.lathe())) as written:

@@ -12,6 +12,7 @@ from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
     change_sentence,
+    knock_sentence,
 )
 from lathe_chatter.model import Cut
 from lathe_chatter.model.lathe_parameter_table import parameters_of
@@ -34,7 +35,7 @@ from lathe_chatter.recording.ros_messages import (
     parameters_bytes,
     topic_of_type,
 )
-from lathe_chatter.report.run_history import read_history
+from lathe_chatter.report.run_history import in_words, read_history
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 TICK = 20
@@ -224,6 +225,24 @@ def test_a_lathe_that_was_killed_and_started_again_has_two_sessions(
     assert history.duration == pytest.approx(0.5)
     text, loss, unproven = said(tmp_path / 'run')
     assert (loss, unproven) == (False, False) if logged else not loss, text
+
+
+def test_what_happened_at_one_and_the_same_time_is_told_as_it_happened(tmp_path: Path) -> None:
+    """A knock, a reset, another knock, with no sample in between."""
+    record = Record(tmp_path / 'run')
+    lathe = record.start(VirtualLathe(), asked=True)
+    record.cut(lathe, 100)
+    record.log(knock_sentence(lathe.time, 0.001))
+    lathe.knock(0.001)
+    record.log(BEGINNING_AGAIN)
+    lathe = VirtualLathe()
+    record.log(knock_sentence(0.0, 0.002))
+    lathe.knock(0.002)
+    record.cut(lathe, 100)
+    record.writer.close()
+    found = [in_words(event) for event in read_history(tmp_path / 'run').in_order()]
+    assert found == ['knock, 1 mN s', 'the lathe was reset', 'knock, 2 mN s']
+    assert said(tmp_path / 'run')[1:] == (False, False)
 
 
 def test_resets_keep_the_cut_that_was_there(tmp_path: Path) -> None:
