@@ -140,6 +140,21 @@ class ChatterDetector:
             return replace(self._estimate, mode=Mode.BLIND)
         return self._estimate
 
+    def follow_depth(self, factor: float) -> None:
+        """Take it that the cut is deeper or less deep: what is recommended is for this depth.
+
+        The samples tell it too late: of chatter that has grown out of the cut less force is heard
+        than there is.
+
+        Args:
+            factor: The depth of cut over that of before; nan where nobody knows, and then nothing
+                is recommended that depends on it.
+        """
+        for adviser in self._advisers:
+            adviser.follow_depth(factor)
+        if (request := self._estimate.request) is not None:
+            self._estimate = replace(self._estimate, request=request.at_depth(factor))
+
     def set_machine(
         self,
         machine: Machine | None,

@@ -69,6 +69,18 @@ class AdviceRequest:
         same = speed_range == self.speed_range
         return self if same else replace(self, speed_range=speed_range)
 
+    def at_depth(self, factor: float) -> AdviceRequest | None:
+        """For a depth of cut that is so many times as large, nan for unknown: None then."""
+        if self.machine is None:  # the rule of thumb is the same at every depth
+            return self
+        if not math.isfinite(factor):
+            return None
+        cutting, error = self.known.cutting_stiffness, self.known.cutting_error
+        known = self.known._replace(
+            cutting_stiffness=factor * cutting, cutting_error=factor * error
+        )
+        return replace(self, known=known)
+
     @cached_property
     def answer(self) -> Advice:
         """What to do, some 10 ms after it is asked for first."""
@@ -131,6 +143,16 @@ class SpeedAdviser:
         self.speed_range = speed_range
         if self.request is not None:
             self.request = self.request.within(speed_range)
+
+    def follow_depth(self, factor: float) -> None:
+        """Recommend for another depth; what is heard of that amid chatter is not believed.
+
+        Args:
+            factor: The depth of cut over that of before; nan where nobody knows.
+        """
+        if self.request is not None:
+            self.request = self.request.at_depth(factor)
+            self._error = 0.0
 
     def is_due(self, hops_after_alarm: int) -> bool:
         """Whether a speed is to be recommended now."""

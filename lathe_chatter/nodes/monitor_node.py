@@ -21,6 +21,7 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.lathe_parameter_table import machine_from
 from lathe_chatter.model.machine_file import MachineDescription, narrowed
+from lathe_chatter.nodes.depth_watch import DepthWatch
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.monitor_sentences import (
@@ -94,18 +95,14 @@ class MonitorNode(ParameterNode):
             self._asked = RemoteMachine(self, self._learn)
         self._speed_range = self._own_speeds()
         self._detector = self._new_detector()
-        self._continuity, self._since = Continuity(), 'nothing yet'
-        self._complaint = ''
+        self._depth = DepthWatch(self, lambda factor: self._detector.follow_depth(factor))  # noqa: PLW0108 -- of then
+        self._continuity, self._since, self._complaint = Continuity(), 'nothing yet', ''
         self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
-        self._logged_advice = Advice()
-        self._mode = Mode.WAITING
+        self._logged_advice, self._mode = Advice(), Mode.WAITING
         self._faults: tuple[str, ...] = ()
-        self._senders: list[str] = []  # where they are several, and nothing is judged
-        self._silent = False
-        self._heard_at = self._leapt_at = self._newest = -math.inf
-        self._figures: Mapping[str, float] = {}
-        self._details: Mapping[str, object] = {}
-        self._next_report = -math.inf
+        self._senders, self._silent = list[str](), False  # several senders: nothing is judged
+        self._heard_at = self._leapt_at = self._newest = self._next_report = -math.inf
+        self._figures, self._details = dict[str, float](), dict[str, object]()
         self._reported_at, self._reported_lost = -math.inf, 0
 
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
@@ -153,8 +150,10 @@ class MonitorNode(ParameterNode):
             self._complain(error)
             return
         self._complaint = ''
-        # The spindle of a machine that is yet to be told may not have the speed.
-        if estimate.request is not None and self._awaits_machine():
+        # Of a machine that is yet to be told the spindle may not have the speed; one that has just
+        # been told soon knows better.
+        rule = estimate.request is not None and estimate.request.machine is None
+        if rule and (self._awaits_machine() or estimate.mode.knows_machine):
             estimate = replace(estimate, request=None)
         self._publish(estimate)
 
@@ -209,6 +208,7 @@ class MonitorNode(ParameterNode):
             self._set_flag(times[0], raised=False)
         self._detector = self._new_detector()
         self._next_report = -math.inf
+        self._depth.forget()
         if self._asked is not None:
             self._asked.ask()  # it may be another machine
         return True

@@ -100,6 +100,27 @@ def test_nothing_is_recommended_while_the_chatter_dies_down() -> None:
     assert not any(estimate.advice.speeds for estimate in dying)
 
 
+def test_advice_is_for_the_depth_that_is_told_amid_chatter() -> None:
+    depth, deeper = 0.8e-3, 1.6e-3
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=depth, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    before = _watch(detector, lathe, 2.0)[-1].recommended_speed_rpm
+    assert _growth(Machine(), before, depth) < 0.0 < _growth(Machine(), before, deeper)
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=deeper))
+    detector.follow_depth(deeper / depth)
+    for estimate in _watch(detector, lathe, 2.0):
+        assert estimate.chatter
+        advice = estimate.advice
+        if advice.speeds:
+            assert _growth(Machine(), advice.speeds[0].spindle_speed_rpm, deeper) < 0.0
+        else:
+            limited = deeper * advice.depth_factor
+            assert _growth(Machine(), advice.depth_speed_rpm, limited) < 0.0
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=depth))
+    detector.follow_depth(math.nan)
+    assert all(each.request is None for each in _watch(detector, lathe, 0.5))
+
+
 @pytest.mark.parametrize('after', [0.3, 3.0])
 def test_a_machine_that_is_told_amid_chatter_gives_advice_in_place_of_the_rule(
     after: float,

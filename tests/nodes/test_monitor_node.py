@@ -21,6 +21,7 @@ from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.parameter_tables import RECORDED_TOPICS
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
+from lathe_chatter.stability import rightmost_root
 
 BLOCK = 200
 STABLE = Cut(bearing_contact=BearingContact.NONE)
@@ -93,6 +94,40 @@ def test_after_a_speed_that_is_no_cure_another_is_recommended(
     lathe.lathe.retune(UNSTABLE.with_changes(spindle_speed_rpm=5000.0))  # its root: +13.0 1/s
     lathe.cut(1.5)
     bench.spin_until(lambda: told()[-1] > 2.5, 'another one')
+
+
+def test_a_cut_made_deeper_amid_chatter_has_advice_for_its_depth(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    depth, deeper = 0.0008, 0.0016
+
+    def suits(message: Float64, depth: float) -> bool:
+        return rightmost_root(VirtualLathe().machine, message.data, depth, seated=False).real < 0.0
+
+    start(LatheNode, depth_of_cut=depth, bearing_contact='none', force_noise=4.5e-4)
+    start(MonitorNode, model='lathe', fastest_speed=12_000.0)
+    speeds = bench.listen(Float64, '/chatter_monitor/recommended_speed_rpm')
+    bench.spin_until(lambda: len(speeds) > 20, 'advice')
+    assert suits(speeds[-1], depth)
+    assert not suits(speeds[-1], deeper)
+    assert bench.set('/lathe', depth_of_cut=deeper)[0].successful
+    bench.spin_until(lambda: suits(speeds[-1], deeper), 'other advice')
+    speeds.clear()
+    bench.spin_until(lambda: len(speeds) > 20, 'more of it')
+    assert all(suits(speed, deeper) for speed in speeds)
+
+
+def test_no_rule_of_thumb_is_said_of_a_lathe_that_tells_its_machine(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    """Also not in the moment in which it has told it, amid chatter."""
+    log = bench.listen_first(Log, '/rosout', LATCHED)
+    start(MonitorNode, model='lathe')
+    start(LatheNode, depth_of_cut=0.0014, bearing_contact='none', force_noise=1e-3)
+    bench.spin_until(lambda: any(' try ' in entry.msg for entry in log), 'advice')
+    assert not any('rule of thumb' in entry.msg for entry in log)
+    told = [' machine it is' in entry.msg for entry in log].index(True)
+    assert any(' chatter ' in entry.msg for entry in log[:told])
 
 
 def test_a_late_joiner_gets_the_flag_and_the_state(

@@ -1,0 +1,61 @@
+"""The depth of cut that a lathe says it has, followed while it cuts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import QoSProfile
+
+from lathe_chatter.nodes.remote_parameters import RemoteParameters
+
+_DEPTH = 'depth_of_cut'
+
+
+class DepthWatch:
+    """Tells when the depth of a lathe changes, and by how much.
+
+    Args:
+        node: That wants to know; the lathe is the node `lathe` beside it, remappable like its
+            topics.
+        on_change: Called with the new depth over the one of before; nan where that is not known.
+    """
+
+    def __init__(self, node: Node, on_change: Callable[[float], None]) -> None:
+        """Nothing is known yet."""
+        self._on_change = on_change
+        self._depth = math.nan
+        self._parameters = RemoteParameters(node, self._take)
+        service = node.resolve_service_name('lathe/get_parameters')
+        self._lathe = service.removesuffix('/get_parameters')
+        node.create_subscription(
+            ParameterEvent, '/parameter_events', self._on_event, QoSProfile(depth=100)
+        )
+        node.create_timer(1.0, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def forget(self) -> None:
+        """It may be another lathe."""
+        self._depth = math.nan
+        self._parameters.want_again('lathe')
+
+    def _look(self) -> None:
+        self._parameters.ask('lathe', [_DEPTH])
+        self._parameters.look()
+
+    def _take(self, _name: str, values: dict[str, Any]) -> None:
+        if isinstance(depth := values.get(_DEPTH), float):
+            self._depth = depth
+
+    def _on_event(self, event: ParameterEvent) -> None:
+        if event.node != self._lathe:
+            return
+        for entry in (*event.new_parameters, *event.changed_parameters):
+            if entry.name == _DEPTH:
+                before, self._depth = self._depth, float(parameter_value_to_python(entry.value))
+                if before != self._depth:
+                    self._on_change(self._depth / before if before > 0.0 else math.nan)
