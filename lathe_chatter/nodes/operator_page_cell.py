@@ -7,7 +7,7 @@ import math
 import struct
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -23,7 +23,7 @@ from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.sample_receiver import join_blocks
 from lathe_chatter.page.live_signals import LiveSignals
 from lathe_chatter.page.server import Viewer
-from lathe_chatter.page.stability_chart import chart_key, stability_chart
+from lathe_chatter.page.stability_chart import chart_key, speeds_beyond, stability_chart
 from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step, find_scenario, load_scenario
@@ -175,15 +175,20 @@ class OperatedCell:
         self.board.put('statuses', {who: statuses.get(n, {}) for who, n in self._names.items()})
         self._run(self.clients.look())
         values = self.clients.values.get('lathe')
-        if values and not self._charting and chart_key(values) != self._chart_of:
+        if not values or self._charting:
+            return
+        recommended = self._figures_now().get('recommended_speed_rpm')
+        speeds = values.get('spindle_speed_rpm'), recommended
+        beyond = speeds_beyond(self.board.get('chart'), speeds)
+        if beyond or chart_key(values) != self._chart_of:
             self._charting, self._chart_of = True, chart_key(values)
-            self._run(self._draw_chart(dict(values)))
+            self._run(self._draw_chart(dict(values), speeds))
 
-    async def _draw_chart(self, values: dict[str, Any]) -> None:
+    async def _draw_chart(self, values: dict[str, Any], speeds: Iterable[float | None]) -> None:
         """Compute the chart beside the loop."""
         self.board.put('charting', value=True)
         try:
-            chart: Any = await asyncio.to_thread(stability_chart, values)
+            chart: Any = await asyncio.to_thread(stability_chart, values, speeds)
         except LatheChatterError as error:
             chart = {'error': str(error)}
         self._charting = False
@@ -192,12 +197,15 @@ class OperatedCell:
 
     # -- what is shown ---------------------------------------------------------------------
 
+    def _figures_now(self) -> dict[str, float]:
+        """What the monitor has said of late."""
+        oldest = self._signals.time - _STALE
+        return {name: value for name, (value, at) in self._figures.items() if not at < oldest}
+
     def fill(self, viewer: Viewer, header: dict[str, Any], arrays: dict[str, Any]) -> None:
         """Put into a frame what a viewer has not seen."""
         signals = self._signals
-        known = self._figures.items()
-        now = {name: value for name, (value, at) in known if not signals.time - at > _STALE}
-        self.board.put('figures', now)
+        self.board.put('figures', self._figures_now())
         header['cell'] = self.board.news(viewer.seen.setdefault('cell', {}))
         if not signals.envelopes:
             return

@@ -18,7 +18,7 @@ from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
-from lathe_chatter.page.stability_chart import draw_chart
+from lathe_chatter.page.stability_chart import draw_chart, speeds_beyond
 from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.chunk_messages import messages_of
@@ -246,18 +246,23 @@ class RecordedRun:
                 for name, series in history.estimates.items()
                 if name in _ESTIMATES and np.any(np.abs(series[0] - time) < 1.0)
             }
-            cell['chart'] = self._chart(history, time)
+            recommended = cell['figures'].get('recommended_speed_rpm')
+            cell['chart'] = self._chart(history, time, recommended)
         return {'closeup': figures, 'cell': cell, 'moment': time}, arrays
 
-    def _chart(self, history: History, time: float) -> Any:
-        """The chart that held at a time; a new one only where it is another."""
+    def _chart(self, history: History, time: float, recommended: float | None) -> Any:
+        """The chart that held at a time; a new one only where it is another, or falls short."""
         session, cut = history.session_at(time), history.cut_at(time)
         key = session.machine, session.tool_leaves_cut, cut.with_changes(
             spindle_speed_rpm=3000.0, depth_of_cut=0.0
         )  # fmt: skip
-        if self._chart_of is None or self._chart_of[0] != key:
-            leaves = session.tool_leaves_cut
-            chart = draw_chart(session.machine, cut, session.described, tool_leaves_cut=leaves)
+        shown = None if self._chart_of is None else self._chart_of[1]
+        speeds = cut.spindle_speed_rpm, recommended
+        if self._chart_of is None or self._chart_of[0] != key or speeds_beyond(shown, speeds):
+            chart = draw_chart(
+                session.machine, cut, session.described, speeds,
+                tool_leaves_cut=session.tool_leaves_cut,
+            )  # fmt: skip
             self._chart_of = key, chart
         return self._chart_of[1]
 

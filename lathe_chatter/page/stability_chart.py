@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from lathe_chatter.report.stability_chart import (
     chart_speeds,
     top_of_chart,
     usual_speeds,
+    with_room_for,
 )
 from lathe_chatter.stability.probability import stability_probability
 
@@ -37,7 +38,16 @@ def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: values[name] for name in _MATTERS if name in values}
 
 
-def stability_chart(values: Mapping[str, Any]) -> dict[str, Any]:
+def speeds_beyond(chart: Any, speeds: Iterable[float | None]) -> list[float]:
+    """Those of some speeds, rev/min, that a chart does not show; None is none of them."""
+    ends = chart.get('speed') if chart else None
+    known = [speed for speed in speeds if speed is not None]
+    return [speed for speed in known if ends and not ends[0] <= speed <= ends[-1]]
+
+
+def stability_chart(
+    values: Mapping[str, Any], speeds: Iterable[float | None] = ()
+) -> dict[str, Any]:
     """The chart of a lathe from its parameters, see `draw_chart`.
 
     Raises:
@@ -46,19 +56,34 @@ def stability_chart(values: Mapping[str, Any]) -> dict[str, Any]:
     known = {name: value for name, value in values.items() if value is not None}
     leaves = bool(known.get('tool_leaves_cut', True))
     described = described_by(known)
-    return draw_chart(machine_from(known), cut_from(known), described, tool_leaves_cut=leaves)
+    return draw_chart(
+        machine_from(known), cut_from(known), described, speeds, tool_leaves_cut=leaves
+    )
 
 
 def draw_chart(
-    machine: Machine, cut: Cut, described: MachineDescription | None, *, tool_leaves_cut: bool
+    machine: Machine,
+    cut: Cut,
+    described: MachineDescription | None,
+    more_speeds: Iterable[float | None] = (),
+    *,
+    tool_leaves_cut: bool,
 ) -> dict[str, Any]:
     """The limits over the speeds of a spindle, SI and rev/min; no limit is null.
 
     Where the machine is known with errors, the depths that are stable with some probabilities
     too.
+
+    Args:
+        machine: Tool, workpiece, bearing and material.
+        cut: That is judged.
+        described: The file of the machine, None where it has none.
+        more_speeds: That have to be on it, rev/min, as one that is recommended; None is none.
+        tool_leaves_cut: The force law, see `VirtualLathe`.
     """
     spindle = described.speed_range if described else None
-    low, high = spindle or usual_speeds(machine, cut)
+    shown = spindle or usual_speeds(machine, cut)
+    low, high = with_room_for(shown, speeds_beyond({'speed': shown}, more_speeds))
     speeds = chart_speeds(low, high)
     limits = chart_limits(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut)
     found: dict[str, Any] = {name: finite(getattr(limits, name)) for name in LIMITS}

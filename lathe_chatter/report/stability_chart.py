@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -86,9 +87,15 @@ def usual_speeds(machine: Machine, cut: Cut) -> tuple[float, float]:
         float(f'{turns * 60.0 * flexible.natural_frequency / (2.0 * math.pi):.2g}')
         for turns in _USUAL
     )
-    speed = cut.spindle_speed_rpm
-    low, high = min(low, speed / _ABOUT_THE_CUT), max(high, speed * _ABOUT_THE_CUT)
+    return with_room_for((low, high), [cut.spindle_speed_rpm])
+
+
+def with_room_for(shown: tuple[float, float], speeds: Iterable[float]) -> tuple[float, float]:
+    """Speeds of a chart, and those about some others that are beyond them, rev/min."""
+    low, high = shown
     allowed = limits_of(Cut, 'spindle_speed_rpm')
+    for speed in speeds:
+        low, high = min(low, speed / _ABOUT_THE_CUT), max(high, speed * _ABOUT_THE_CUT)
     return max(low, allowed.low), min(high, allowed.high)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from lathe_chatter.model.lathe_parameter_table import LATHE
-from lathe_chatter.page.stability_chart import chart_key, stability_chart
+from lathe_chatter.page.stability_chart import chart_key, speeds_beyond, stability_chart
 
 START = LATHE.complete({})
 
@@ -41,3 +41,14 @@ def test_what_the_key_leaves_out_changes_no_chart() -> None:
     }  # fmt: skip
     assert chart_key(LATHE.complete(left_out)) == chart_key(START)
     assert stability_chart(LATHE.complete(left_out)) == stability_chart(START)
+
+
+def test_a_chart_has_the_speed_of_the_cut_and_the_one_that_is_recommended() -> None:
+    usual, fast, slow = stability_chart(START), 27_545.0, 200.0
+    assert speeds_beyond(usual, [3000.0, None]) == []
+    assert speeds_beyond(usual, [3000.0, fast, slow]) == [fast, slow]
+    assert speeds_beyond(None, [fast]) == speeds_beyond({'error': 'no machine'}, [fast]) == []
+    wide = stability_chart(START, [fast, slow])
+    assert speeds_beyond(wide, [3000.0, fast, slow]) == []
+    assert min(usual['open_limit']) == pytest.approx(min(wide['open_limit']), rel=0.02)
+    assert stability_chart(START, [4000.0]) == usual
