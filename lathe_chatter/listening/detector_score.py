@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector, Estimate
-from lathe_chatter.detection.estimate import STATES
+from lathe_chatter.detection.estimate import IDLE, STABLE, STATES, UNKNOWN
 from lathe_chatter.errors import SignalFileError, reason_of
 from lathe_chatter.listening.signal_file import Signals
 
@@ -25,6 +25,7 @@ _LATE = 0.5
 """s within which a flag belongs to the chatter that began before it."""
 CHATTER = 'chatter'
 _HEAD = ['start', 'end', 'state']
+_CALM = {STABLE, IDLE, UNKNOWN}
 
 
 class Spell(NamedTuple):
@@ -34,7 +35,8 @@ class Spell(NamedTuple):
         time: Of its first estimate, s.
         state: As in `Estimate`.
         chatter: Whether it was flagged at first.
-        frequency: Median of its estimates, Hz; the first ones may be far off. Nan without any.
+        frequency: Median of its estimates, Hz; the first ones may be far off. Nan without any, and
+            where nothing vibrates by itself: without a machine it is then that of some noise.
         growth_rate: Likewise, 1/s.
     """
 
@@ -66,9 +68,10 @@ class Judged:
         timed = (each for each in self.estimates if math.isfinite(each.time))
         found = []
         for state, each in itertools.groupby(timed, lambda estimate: estimate.state):
-            inside = list(each)
+            every = list(each)
+            inside = [e for e in every if state not in _CALM or e.mode.knows_machine]
             figures = (_settled(inside, name) for name in ('frequency', 'growth_rate'))
-            found.append(Spell(inside[0].time, state, inside[0].chatter, *figures))
+            found.append(Spell(every[0].time, state, every[0].chatter, *figures))
         return found
 
 

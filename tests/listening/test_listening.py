@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from scipy.io import savemat, wavfile
 
 from lathe_chatter.cli.main import main
 from lathe_chatter.detection import Estimate
+from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.listening import Judged, Signals, read_signals, score
@@ -149,6 +151,15 @@ def test_a_spell_has_the_settled_figures_not_the_first() -> None:
     ]  # fmt: skip
     assert spells[1].frequency == 207.0
     assert np.isnan(spells[0].frequency)
+
+
+def test_a_stable_cut_has_a_frequency_only_where_a_machine_tells_it() -> None:
+    heard = Estimate(1.0, 'stable', frequency=311.0, growth_rate=-20.0)
+    for mode, known in ((Mode.NO_MACHINE, False), (Mode.MIXTURE, False), (Mode.FULL, True)):
+        (spell,) = Judged((replace(heard, mode=mode),)).spells()
+        assert np.isfinite([spell.frequency, spell.growth_rate]).all() == known
+        (flagged,) = Judged((replace(heard, mode=mode, state='chatter'),)).spells()
+        assert flagged.frequency == 311.0
 
 
 def test_a_tone_is_told_with_its_frequency_and_is_no_chatter_of_a_spindle_that_has_it(
