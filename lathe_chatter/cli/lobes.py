@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -139,7 +140,10 @@ def run(options: Namespace) -> int:
         return INTERRUPTED
     with writing(options.output):
         options.output.parent.mkdir(parents=True, exist_ok=True)
-        draw_lobes(config.cut, limits, growth, top, options.output, probability=probability)
+        draw_lobes(
+            config.cut, limits, growth, top, options.output,
+            probability=probability, mark=_is_cut_known(config),
+        )  # fmt: skip
     if options.csv is not None:
         with writing(options.csv):
             _write_csv(options.csv, _columns(config, limits), growth, probability)
@@ -147,6 +151,8 @@ def run(options: Namespace) -> int:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
     say_what_is_assumed(config.described, screen, config.machine)
+    for sentence in _beyond_the_spindle(config, low, high):
+        screen.say(f'WARNING  {sentence}')
     figures = _figures(config, limits, growth)
     if probability is not None and known:
         of_cut = stability_probability(
@@ -155,12 +161,34 @@ def run(options: Namespace) -> int:
         )  # fmt: skip
         sure = float(np.min(probability.safe_depth(SURE))) * 1e3
         screen.say(f'lowest depth that is safe with {SURE:.0%}: {sure:.4g} mm')
-        screen.say(probability_sentence(config.cut, of_cut))
+        if _is_cut_known(config):
+            screen.say(probability_sentence(config.cut, of_cut))
         figures |= _probable_figures(config, probability, of_cut)
     for file in files:
         screen.name_file('picture', file)
     screen.json(figures)
     return 0
+
+
+def _is_cut_known(config: LatheConfig) -> bool:
+    """Whether it is said what is cut: a machine of one's own does not cut as the paper's."""
+    usual, cut = Cut(), config.cut
+    told = cut.spindle_speed_rpm, cut.depth_of_cut
+    return config.described is None or told != (usual.spindle_speed_rpm, usual.depth_of_cut)
+
+
+def _beyond_the_spindle(config: LatheConfig, low: float, high: float) -> Iterator[str]:
+    """That cut or chart need speeds which the spindle has not, as its file says."""
+    described, cut = config.described, config.cut
+    if described is None:
+        return
+    if _is_cut_known(config) and (doubt := described.speed_doubt(cut)):
+        yield doubt
+    ends = [described.speed_doubt(cut.with_changes(spindle_speed_rpm=end)) for end in (low, high)]
+    if any(ends):
+        swing = cut.speed_variation_amplitude
+        with_swing = f' with its swing of {swing:.0%}' if swing else ''
+        yield f'The chart has speeds at which the spindle{with_swing} leaves its range.'
 
 
 def _tables(options: Namespace, config: LatheConfig) -> list[Path]:
@@ -178,9 +206,18 @@ def _is_mapped(options: Namespace, config: LatheConfig) -> bool:
 
 
 def _speed_range(options: Namespace, config: LatheConfig) -> tuple[float, float]:
-    """What is asked for, else the spindle's range, else one that suits the machine, rev/min."""
+    """What is asked for, else the spindle's range, else one that suits the machine, rev/min.
+
+    Where the speed is varied those at which all of its swing is in the spindle's range.
+    """
     spindle = config.described.speed_range if config.described else None
     low, high = spindle or usual_speeds(config.machine, config.cut)
+    if spindle:
+        swing = config.cut.speed_variation_amplitude
+        low, high = low / (1.0 - swing), high / (1.0 + swing)
+        if not low < high:
+            allowed = f'a swing that a spindle of {spindle[0]:g} to {spindle[1]:g} rev/min has'
+            raise ParameterError('speed_variation_amplitude', swing, '', allowed)
     low = low if options.low is None else options.low
     high = high if options.high is None else options.high
     return _SPEED.check('--from', low), _SPEED.check('--to', high)

@@ -62,6 +62,7 @@ _ASSUMED = {
     'cutting_coefficient': 'a cutting coefficient (3.5 MPa; steel has about 2000 MPa)',
 }
 """What is taken where a file has one body, and lacks another or the material."""
+_ROUNDING = 1e-12
 _BESIDE = {'material': ['errors']}
 
 
@@ -109,6 +110,7 @@ class MachineDescription:
         """That the spindle does not turn as a cut wants it to, a sentence; else empty."""
         swing = cut.spindle_speed_rpm * cut.speed_variation_amplitude
         slow, fast = cut.spindle_speed_rpm - swing, cut.spindle_speed_rpm + swing
+        slow, fast = slow * (1.0 + _ROUNDING), fast * (1.0 - _ROUNDING)
         if self.slowest_speed <= slow and fast <= self.fastest_speed:
             return ''
         return (

@@ -133,10 +133,13 @@ def draw_lobes(  # noqa: PLR0913 -- what a chart may show
     path: Path,
     *,
     probability: StabilityProbability | None = None,
+    mark: bool = True,
 ) -> None:
     """Draw a chart into a file, see `draw_chart` and `save`."""
     figure = new_figure(11.0, 6.0)
-    draw_chart(figure.subplots(), cut, limits, growth, depth_limit, probability=probability)
+    draw_chart(
+        figure.subplots(), cut, limits, growth, depth_limit, probability=probability, mark=mark
+    )
     save(figure, path)
 
 
@@ -148,6 +151,7 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
     depth_limit: float,
     *,
     probability: StabilityProbability | None = None,
+    mark: bool = True,
 ) -> None:
     """Draw a chart with its point of operation.
 
@@ -158,6 +162,7 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
         growth: To colour the chart with, or None.
         depth_limit: Top of the chart, m.
         probability: To colour it with, of a machine that is known with errors.
+        mark: Whether the point of operation is known, and marked.
     """
     varied = cut.speed_variation_amplitude > 0.0
     if growth is not None:
@@ -167,7 +172,7 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
     if probability is not None:
         draw_probability(axes, probability, depth_limit)
     slowest, fastest = limits.spindle_speed_rpm[[0, -1]].tolist()
-    if cut.depth_of_cut <= depth_limit and slowest <= cut.spindle_speed_rpm <= fastest:
+    if mark and cut.depth_of_cut <= depth_limit and slowest <= cut.spindle_speed_rpm <= fastest:
         axes.plot(
             cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
             ms=7, label='the cut', clip_on=False, zorder=5,
@@ -203,7 +208,7 @@ def plot_lobes(
     *,
     axes: Axes | None = None,
 ) -> Axes:
-    """Plot the limits and the safe region of a machine, its cut as a point.
+    """Plot the limits and the safe region of a machine, its cut as a point: mm over rev/min.
 
     Args:
         machine: Tool, workpiece, bearing and material; by default the paper's.

@@ -286,6 +286,59 @@ def test_a_map_that_fails_is_a_sentence_and_leaves_nothing_in_the_way(
     assert cli.main([*call, '--tool.mass', '0.06']) == 0
 
 
+def test_a_chart_of_a_machine_marks_no_cut_that_nobody_has_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / 'mine.yaml'
+    file.write_text(
+        'tool: {modes: [{frequency: 120 Hz, damping_ratio: 4 %, mass: 2 kg}]}\n'
+        'workpiece: rigid\n'
+        'material: {cutting_coefficient: 2000 MPa, errors: {cutting_coefficient: 10 %}}\n'
+    )
+    call = ['lobes', '--machine', str(file), '--output', str(tmp_path / 'a.svg'), '--force']
+    for more, known in ([], False), (['--depth-of-cut', '0.02 mm'], True):
+        assert cli.main([*call, *more]) == 0
+        assert ('the cut' in (tmp_path / 'a.svg').read_text(encoding='utf-8')) is known
+        assert ('is stable with' in capsys.readouterr().out) is known
+
+
+def test_a_chart_of_a_varied_speed_keeps_all_of_its_swing_in_the_range_of_the_spindle(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spindle = 'spindle: {slowest_speed: 2000 rpm, fastest_speed: 4400 rpm}'
+    machine = f'{{{spindle}, cut: {{spindle_speed: 3000 rpm}}}}'
+    call = [
+        'lobes',
+        '--machine',
+        machine,
+        '--output',
+        str(tmp_path / 'a.png'),
+        '--json',
+        '--force',
+    ]
+    varied = ['--speed-variation-amplitude', '0.1', '--speed-variation-frequency', '20']
+    few = ['--depth-limit', '0.1 mm']
+
+    def chart(*more: str) -> tuple[float, float, str]:
+        assert cli.main([*call, *few, *more]) == 0
+        told = capsys.readouterr()
+        speeds = json.loads(told.out)['spindle_speed_rpm']
+        return speeds[0], speeds[-1], told.err
+
+    assert chart()[:2] == (2000.0, 4400.0)
+    low, high, said = chart(*varied)
+    assert (low, high) == pytest.approx((2000.0 / 0.9, 4400.0 / 1.1))
+    assert 'WARNING' not in said
+    said = chart(*varied, '--to', '4400')[2]
+    assert (
+        'The chart has speeds at which the spindle with its swing of 10% leaves its range.' in said
+    )
+    said = chart(*varied, '--spindle-speed-rpm', '4200')[2]
+    assert 'The spindle turns outside of what the machine file says it can' in said
+    assert cli.main([*call, '--speed-variation-amplitude', '0.45']) == 2
+    assert 'a swing that a spindle of 2000 to 4400 rev/min has' in capsys.readouterr().err
+
+
 def test_a_chart_says_where_the_machine_of_the_paper_stands_in(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
