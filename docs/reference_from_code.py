@@ -36,6 +36,7 @@ GROUPS = {
         'stability_probability',
         'smallest_lasting_knock',
         'plot_lobes',
+        'show_figure',
         'SpeedLaw',
         'ProcessDamping',
     ),
