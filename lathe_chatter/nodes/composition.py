@@ -103,9 +103,9 @@ class Cell:
                 stack.callback(node.destroy_node)
 
     def spin(self, executor: Executor, ended: Callable[[], bool]) -> None:
-        """Serve all three until `ended` says so; the lathe's requests go by events."""
+        """Serve all three until `ended` says so."""
         polled = [
-            Served(make_executor(node, by_events=False), node, _SERVE_PERIOD)
+            Served(make_executor(node), node, _SERVE_PERIOD)
             for node in (self.monitor, self.recorder)
         ]
         spin_together([Served(executor, self.lathe), *polled], ended)

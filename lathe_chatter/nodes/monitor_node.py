@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -47,8 +46,6 @@ _REST = 40_000_000
 """ns that the node lets samples come in before it looks at them together."""
 _REST_ON_WATCH = 10_000_000
 """ns, likewise, while the vibration grows: an alarm may be due."""
-_SERVE_PERIOD = 40_000_000
-"""ns from one look for requests to the next: a look costs more than the samples of a rest."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
 _FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
@@ -390,11 +387,8 @@ class MonitorNode(ParameterNode):
 
 def main() -> None:
     """Run the node until it is told to end."""
-    # The executor driven by events would take the samples away.
-    spin = partial(spin_in_ticks, serve_period=_SERVE_PERIOD)
     run_node(
         lambda own: MonitorNode(by_timer=False, cli_args=own['chatter_monitor']),
         {'chatter_monitor': MONITOR},
-        by_events=False,
-        spin=spin,
+        spin=spin_in_ticks,
     )

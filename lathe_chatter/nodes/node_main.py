@@ -89,7 +89,6 @@ def run_node(
     make: Callable[[Own], _Node],
     members: Members,
     *,
-    by_events: bool = True,
     spin: Spin[_Node] | None = None,
     usage: str = '',
 ) -> None:
@@ -101,7 +100,6 @@ def run_node(
     Args:
         make: Makes the node once rclpy is initialised, with what is given to each member alone.
         members: The nodes by name, each with the table of its parameters.
-        by_events: Whether the executor may be the one driven by events; see `make_executor`.
         spin: How the node is served until it is told to end; by default as `serve` does.
         usage: What `--help` prints; by default the table of the one node.
 
@@ -127,7 +125,7 @@ def run_node(
         with DeferredSignals() as signals:
             node.begin()
             begun = True
-            (spin or serve)(make_executor(node, by_events=by_events), node, signals.came)
+            (spin or serve)(make_executor(node), node, signals.came)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except _START_ERRORS as error:

@@ -197,10 +197,8 @@ def _spin(executor: Executor, node: OperatorPageNode, ended: Callable[[], bool])
 
 def main() -> None:
     """Run the node until it is told to end."""
-    # The executor driven by events would take away what is polled.
     run_node(
         lambda own: OperatorPageNode(cli_args=own['operator_page']),
         {'operator_page': PAGE},
-        by_events=False,
         spin=_spin,
     )

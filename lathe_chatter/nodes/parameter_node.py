@@ -7,7 +7,7 @@ validated without side effects, and handed over once it is accepted.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -20,6 +20,7 @@ from lathe_chatter.errors import ParameterError, UnknownParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
 from lathe_chatter.nodes.command_line_parameters import OF_QOS, OF_RCLPY
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
+from lathe_chatter.nodes.polled_subscription import is_polled
 from lathe_chatter.nodes.real_time_loop import RequestLoad
 
 _SET_SERVICES = (SetParameters, SetParametersAtomically)
@@ -67,6 +68,11 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
     def values(self) -> Mapping[str, Value]:
         """The present value of every parameter of the table."""
         return self._values
+
+    @property
+    def subscriptions(self) -> Iterator[Any]:
+        """Those that executors serve: from one that is polled they would take its messages."""
+        return (each for each in super().subscriptions if not is_polled(each))
 
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Follow a set that was accepted; `values` has it already. Does nothing by itself.

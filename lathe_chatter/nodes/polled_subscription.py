@@ -27,7 +27,7 @@ def publisher_names(node: Node, topic: str) -> list[str]:
 
 
 class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type information
-    """Keeps subscriptions out of what the executor waits for."""
+    """Marks what is polled; keeps it out of what an executor waits for, but for one by events."""
 
     def can_execute(self, _entity: Any) -> bool:
         return False
@@ -37,6 +37,11 @@ class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type inf
 
     def ending_execution(self, _entity: Any) -> None:
         return
+
+
+def is_polled(subscription: Any) -> bool:
+    """Whether it is the subscription of a `PolledSubscription`."""
+    return isinstance(subscription.callback_group, _NeverReady)
 
 
 class PolledSubscription:
@@ -73,12 +78,12 @@ class PolledSubscription:
     def take(self) -> Iterator[tuple[bytes, Mapping[str, Any]]]:
         """What has come, and what the middleware says of each; no more than may wait here."""
         handle = self._subscription.handle
-        for _ in range(self._most):
-            with handle:
+        with handle:
+            for _ in range(self._most):
                 found = handle.take_message(self._kind, True)  # noqa: FBT003 -- raw
-            if found is None:
-                return
-            yield found
+                if found is None:
+                    return
+                yield found
 
     def publishers(self) -> frozenset[tuple[int, ...]]:
         """The marks that DDS gives to those that publish the topic."""

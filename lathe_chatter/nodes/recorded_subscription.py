@@ -25,7 +25,7 @@ _STREAMS = (SAMPLES_TYPE, LOG_TYPE, PARAMETER_EVENT_TYPE)
 """Types of which the latest message alone says nothing."""
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
-Write = Callable[[str, bytes, int, int, int], None]
+Write = Callable[[Topic, bytes, int, int, int], None]
 """Takes topic, message, log time and publish time in ns, and the publisher's number."""
 
 
@@ -118,7 +118,7 @@ class RecordedTopic:
 
     def take(self) -> None:
         """Take everything that has arrived."""
-        taken, numbering, name, write = 0, self.numbering, self.topic.name, self._write
+        taken, numbering, topic, write = 0, self.numbering, self.topic, self._write
         steady = time.monotonic()
         for data, info in self._subscription.take():
             number = info['publication_sequence_number'] or 0  # None where there is none
@@ -130,7 +130,7 @@ class RecordedTopic:
             taken += 1
             if not self.paused:
                 received = info['received_timestamp'] or time.time_ns()
-                write(name, data, received, published or received, number)
+                write(topic, data, received, published or received, number)
         if not self.paused:
             self.messages += taken
 

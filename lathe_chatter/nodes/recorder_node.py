@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from lathe_chatter.nodes.recorder_topic_selection import TopicWatch, selection
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.run_folders import RunFolders
 from lathe_chatter.nodes.simulation_control import Answer
-from lathe_chatter.recording import RunWriter
+from lathe_chatter.recording import RunWriter, Topic
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch, step_sentence
 from lathe_chatter.recording.provenance import (
     IDENTITY,
@@ -45,8 +44,6 @@ _COMMIT_PERIOD = 0.2
 """s between two commits: with the time that one takes it is what a kill can lose."""
 _TAKE_PERIOD = 0.04
 """s between two times that what has arrived is taken."""
-_SERVE_PERIOD = 40_000_000
-"""ns from one look for requests to the next: a look costs more than what has arrived by then."""
 _LOOK_PERIOD = 0.1
 """s between two looks for topics that have appeared."""
 _NEWS_PERIOD = 10.0
@@ -300,13 +297,13 @@ class RecorderNode(ParameterNode):
                 (self.get_logger().info if done else self.get_logger().error)(said)
 
     def _write(
-        self, name: str, data: bytes, log_time: int, publish_time: int, number: int
+        self, topic: Topic, data: bytes, log_time: int, publish_time: int, number: int
     ) -> None:
         """Write a message as it came."""
-        if self._sink is None:
+        sink, name, kind = self._sink, topic.name, topic.type
+        if sink is None:
             return
-        self._sink.write(name, data, log_time=log_time, publish_time=publish_time, sequence=number)
-        kind = self._topics[name].topic.type
+        sink.write(name, data, log_time=log_time, publish_time=publish_time, sequence=number)
         if self._awaited and kind == LOG_TYPE and self._awaited in data:
             self._awaited = b''
         self._log.receive(name, kind, data, log_time, publish_time)
@@ -388,12 +385,10 @@ def main() -> None:
         SystemExit: With 1 if the disk took no more.
     """
     try:
-        # The executor driven by events would call for each message.
         run_node(
             lambda own: RecorderNode(by_timer=False, cli_args=own['run_recorder']),
             {'run_recorder': RECORDER},
-            by_events=False,
-            spin=partial(spin_in_ticks, serve_period=_SERVE_PERIOD),
+            spin=spin_in_ticks,
         )
     except RecordingFailedError as error:
         sys.stderr.write(f'{error}\n')

@@ -22,6 +22,8 @@ SAMPLES_TYPE = 'std_msgs/msg/Float64MultiArray'
 ENCAPSULATION = b'\x00\x01\x00\x00'
 """What CDR begins with, little-endian."""
 _BYTE_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
+_NUMBERS = {order: np.dtype(f'{order}f8') for order in _BYTE_ORDERS.values()}
+_NUMBER = _NUMBERS['<']
 _DIMENSIONS = 2
 _CUT_OFF = 'A message of samples is cut off or no Float64MultiArray.'
 
@@ -48,10 +50,10 @@ class BlockLayout(NamedTuple):
 
     def numbers(self, data: bytes) -> Array:
         """The samples (n, k) of a block with this layout, read-only where nothing is converted."""
-        count = self.rows * len(self.columns)
-        found = np.frombuffer(data, f'{self.order}f8', count, self.start)
-        numbers: Array = found.astype(float, copy=False)
-        return numbers.reshape(self.rows, -1) if count else numbers.reshape(0, len(self.columns))
+        width = len(self.columns)
+        found = np.frombuffer(data, _NUMBERS[self.order], self.rows * width, self.start)
+        numbers: Array = found.reshape(self.rows, width)
+        return numbers if numbers.dtype.isnative else numbers.astype(float)
 
 
 def block_layout(data: bytes) -> BlockLayout:
@@ -110,7 +112,8 @@ def encode_block(samples: Array, columns: Sequence[str] = SAMPLE_COLUMNS) -> byt
     Raises:
         LayoutError: If names and columns do not match.
     """
-    return _head(*samples.shape, tuple(columns)) + samples.astype('<f8', copy=False).tobytes()
+    numbers = samples if samples.dtype is _NUMBER else samples.astype(_NUMBER)
+    return _head(*samples.shape, tuple(columns)) + numbers.tobytes()
 
 
 @lru_cache(maxsize=64)
