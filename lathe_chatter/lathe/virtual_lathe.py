@@ -198,24 +198,26 @@ class VirtualLathe:
         Raises:
             ParameterError: If `samples` is negative.
         """
-        samples = count_of('samples', samples)
-        samples = 0 if self.guard else samples
+        state = self._state
+        samples = count_of('samples', samples) if not state.guard else 0
         out = np.empty((samples, self._columns))
         self._found = []
         rows, status = 0, layout.SURFACE_FULL
         while status in _NO_ROOM or (rows < samples and status != layout.GUARD):
             whole = rows == 0 and samples <= _AT_ONCE  # a tick: a view costs a tenth of it
-            done, found, status = self._call(out if whole else out[rows : rows + _AT_ONCE])
+            done, found, status = stepper.advance(
+                state.numbers, state.counts, state.nodes, self._flat,
+                out if whole else out[rows : rows + _AT_ONCE], self._event_space, self._room,
+            )  # fmt: skip
             rows += done
             if found:
                 self._found.append(self._event_space[:found].copy())
             if status == layout.SURFACE_FULL:
-                nodes = self._state.nodes
-                self._state.nodes = surface.with_room(nodes, 2 * nodes.shape[1])
+                state.nodes = surface.with_room(state.nodes, 2 * state.nodes.shape[1])
             elif status == layout.EVENTS_FULL:
                 self._event_space = np.empty((2 * len(self._event_space), 3))
         if status == layout.GUARD:
-            self._state.end()
+            state.end()
         return out if rows == samples else out[:rows]
 
     def retune(self, cut: Cut) -> None:
@@ -275,18 +277,6 @@ class VirtualLathe:
         self._flat = self._state.constants.flat
         self._columns = len(self.columns)
         self._room = stepper.room_for(modes)
-
-    def _call(self, out: Array) -> tuple[int, int, int]:
-        """Run the inner loop on `out`: samples, events, and how it ended."""
-        state = self._state
-        done: int
-        found: int
-        status: int
-        done, found, status = stepper.advance(
-            state.numbers, state.counts, state.nodes, self._flat, out, self._event_space,
-            self._room,
-        )  # fmt: skip
-        return done, found, status
 
 
 def _checked(cut: Cut) -> Cut:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -22,26 +23,22 @@ _LATE = 0.1
 
 
 class Durations:
-    """The latest durations of something done over and over, and their quantiles."""
+    """The latest durations of something done over and over, and their quantiles.
+
+    Attributes:
+        add: Notes one.
+        clear: Forgets all.
+    """
 
     def __init__(self) -> None:
         """Begin empty."""
-        self._ring = np.zeros(_LATEST)
-        self._count = 0
-
-    def add(self, duration: float) -> None:
-        """Note one."""
-        self._ring[self._count % _LATEST] = duration
-        self._count += 1
+        self._latest = deque[float](maxlen=_LATEST)
+        self.add, self.clear = self._latest.append, self._latest.clear
 
     def quantiles(self, *fractions: float) -> tuple[float, ...]:
         """The quantiles of those noted since `clear`, 4096 at most; zeros where none were."""
-        known = self._ring[: min(self._count, _LATEST)]
-        return tuple(np.quantile(known, fractions)) if known.size else (0.0,) * len(fractions)
-
-    def clear(self) -> None:
-        """Forget all."""
-        self._count = 0
+        known = self._latest or (0.0,)
+        return tuple(np.quantile(known, fractions))
 
 
 class _Mark(NamedTuple):
@@ -62,6 +59,10 @@ class TickStatistics:
         pacer: Whose lag is reported.
         tick: Simulated duration of a tick, ns.
         requests: That are served beside the ticks.
+
+    Attributes:
+        ticks: How many were made.
+        lateness: By how much each came late, ns.
     """
 
     def __init__(self, pacer: Pacer, tick: float, requests: RequestLoad) -> None:
@@ -70,7 +71,7 @@ class TickStatistics:
         self._tick = tick
         self.ticks = 0
         self._steps = Durations()
-        self._lateness = Durations()
+        self.lateness = Durations()
         self._before = _Mark(0, 0, 0.0, 0, 0, time.monotonic_ns())
         self.begin_second()
 
@@ -81,14 +82,14 @@ class TickStatistics:
         self._engaged += lathe.bearing_engaged
         self._in_cut += lathe.tool_in_cut
 
-    def note_lateness(self, lateness: float) -> None:
-        """Note by how much a tick came late, ns."""
-        self._lateness.add(lateness)
-
     @property
     def behind(self) -> bool:
         """Whether simulated time was given up in this second."""
-        return self._pacer.overruns > self._before.overruns
+        return self.was_behind(self._pacer.overruns)
+
+    def was_behind(self, overruns: int) -> bool:
+        """Whether that was so when there had been so many overruns."""
+        return overruns > self._before.overruns
 
     def begin_second(self) -> None:
         """Forget what belonged to the second that was reported."""
@@ -99,7 +100,7 @@ class TickStatistics:
             self.ticks, self._pacer.overruns, self._pacer.lag, requests.served, requests.taken, now
         )
         self._steps.clear()
-        self._lateness.clear()
+        self.lateness.clear()
         self._engaged = self._in_cut = 0
 
     @property
@@ -137,7 +138,7 @@ class TickStatistics:
         reached = (self.ticks - self._before.ticks) * self._tick / elapsed
         level, message = self._verdict(control, asked, late, clock)
         p50, p99, largest = (q * _MICRO for q in self._steps.quantiles(0.5, 0.99, 1.0))
-        late99, latest = (q * _MICRO for q in self._lateness.quantiles(0.99, 1.0))
+        late99, latest = (q * _MICRO for q in self.lateness.quantiles(0.99, 1.0))
         values = {
             'real-time factor': reached,
             'real-time factor asked for': asked,

@@ -35,6 +35,7 @@ from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.real_time_loop import (
+    NEVER,
     SECOND,
     Pacer,
     RealTime,
@@ -88,8 +89,9 @@ class LatheNode(ParameterNode):
         self._lathe = recorded_config(values).lathe()
         self._pending: Cut | None = None
         self._knocks: list[float] = []
+        drives: bool = values['publish_clock']
         self._topics = LatheTopics(
-            self, values['tick_rate'], self._factor, publish_clock=values['publish_clock']
+            self, self._lathe.columns, values['tick_rate'], self._factor, publish_clock=drives
         )
         self._record = LatheRecord(self, values)
 
@@ -104,7 +106,6 @@ class LatheNode(ParameterNode):
         self._free = self._factor == 0.0
         self._wait_until = 0
         self._others = PublisherWatch(self, self._log)
-        drives: bool = values['publish_clock']
         self._clock_watch = ClockWatch(self, self._log, follows=self._follows, drives=drives)
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
@@ -146,18 +147,17 @@ class LatheNode(ParameterNode):
         since_start = nanoseconds(self._lathe.samples_taken, self._sample_rate)
         return self._stamp_of_zero + since_start
 
-    def next_wake(self) -> int | None:
-        """When it should be woken, ns of time.monotonic_ns(); None where nothing is to be done."""
+    def next_wake(self) -> int:
+        """When it should be woken, ns of time.monotonic_ns(); NEVER for not at all."""
         if self._by_timer:
-            return None
-        now = time.monotonic_ns()
+            return NEVER
         if self._awaited:
-            return now + _LOOK_FOR_READERS
+            return time.monotonic_ns() + _LOOK_FOR_READERS
         if self._control.state is not RunState.RUNNING:
-            return None
+            return NEVER
         if self._free or not self._pacer.started:
-            return now
-        return self._pacer.next_wake(now)
+            return time.monotonic_ns()
+        return self._pacer.next_wake()
 
     def wake(self) -> None:
         """Make the ticks that are due, or as many of them as there is time for in one go."""
@@ -176,16 +176,16 @@ class LatheNode(ParameterNode):
         if self._free:
             self._cut_freely(now)
             return
-        overruns, behind = self._pacer.overruns, self._meter.behind
+        overruns = self._pacer.overruns
         due = self._pacer.due(now)
-        self._meter.note_lateness(self._pacer.lateness(now))
+        self._meter.lateness.add(self._pacer.lateness(now))
         self._make(due)
         if self._pacer.overruns != overruns:
             self._log.warning(
                 f'Behind: {self._pacer.lag / SECOND:.3f} s of simulated time given up so far.',
                 'behind',
             )
-            if not behind:  # else that is known, and to say it would take more time
+            if not self._meter.was_behind(overruns):  # what is known is not said again
                 self._diagnostics.publish_changes(self._statuses())
 
     def _make(self, ticks: int) -> None:
@@ -193,7 +193,7 @@ class LatheNode(ParameterNode):
         until = time.monotonic_ns() + _BUDGET
         for made in range(1, ticks + 1):
             self._tick()
-            if time.monotonic_ns() > until:
+            if made < ticks and time.monotonic_ns() > until:
                 self._pacer.give_back(ticks - made)
                 return
 
@@ -242,7 +242,7 @@ class LatheNode(ParameterNode):
             self._knock()
         samples = self._lathe.advance(self._samples_per_tick)
         if len(samples):
-            self._topics.publish(samples, self._stamp())
+            self._topics.publish(samples, self._stamp)
             self._record.write(samples)
         if self._lathe.guard:
             self._end(self._lathe.guard)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.duration import Duration
@@ -17,7 +18,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.nodes.joint_state_message import joint_states, time_message
 from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
-from lathe_chatter.samples import SAMPLE_COLUMNS, sample_columns
+from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block, encode_number
 
 _SCALARS = {
@@ -33,7 +34,7 @@ MAX_HISTORY = 10_000
 _TIME = SAMPLE_COLUMNS.index('time')
 _SAME = 1000
 """ns by which the roundings of two times differ at most."""
-_LOOK_AROUND = 0.01
+_LOOK_AROUND = 0.05
 """s after which a new listener is noticed."""
 
 
@@ -46,6 +47,7 @@ class LatheTopics:
 
     Args:
         node: That they belong to.
+        columns: Of the samples.
         tick_rate: Messages a simulated second, Hz.
         factor: Simulated seconds per second, 0 for as many as there are.
         publish_clock: Whether /clock is among them.
@@ -55,9 +57,16 @@ class LatheTopics:
     """
 
     def __init__(
-        self, node: Node, tick_rate: float, factor: float, *, publish_clock: bool
+        self,
+        node: Node,
+        columns: tuple[str, ...],
+        tick_rate: float,
+        factor: float,
+        *,
+        publish_clock: bool,
     ) -> None:
         """Create the publishers."""
+        self._columns = columns
 
         def publisher(kind: Any, topic: str, qos: QoSProfile) -> Publisher:
             options = publisher_overrides(node, topic)
@@ -68,6 +77,8 @@ class LatheTopics:
         deep = max(in_real_time, min(faster, MAX_HISTORY))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._samples = publisher(Float64MultiArray, '~/samples', kept)
+        # Bytes need none of what rclpy asks of a message at each call.
+        self._publish_samples = self._samples.handle.publish_raw
         self._scalars = [
             (publisher(Float64, topic, QoSProfile(depth=deep)), column)
             for topic, column in _SCALARS.items()
@@ -79,25 +90,29 @@ class LatheTopics:
         self.zero: int | None = None
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
-        self._looked_around = -_LOOK_AROUND
+        self._look_at = 0.0
         self._heard_scalars: list[tuple[Publisher, int]] = []
-        self._heard_joints = False
+        self._heard_joints = self._timed = False
 
-    def publish(self, samples: Array, stamp: int) -> None:
+    def publish(self, samples: Array, stamp_of_last: Callable[[], int]) -> None:
         """Publish what one tick brought, the state before the clock.
 
         Args:
-            samples: (n, 8) or with accelerations (n, 10), n > 0.
-            stamp: Simulated time of the last, ns.
+            samples: (n, columns), n > 0.
+            stamp_of_last: Asked for its simulated time, ns, where somebody wants it.
         """
-        columns = sample_columns(accelerometers=samples.shape[1] > len(SAMPLE_COLUMNS))
-        self._samples.publish(encode_block(samples, columns))
-        self._look_around()
-        last = samples[-1]
+        self._publish_samples(encode_block(samples, self._columns))
+        now = time.monotonic()
+        if now >= self._look_at:
+            self._look_at = now + _LOOK_AROUND
+            self._look_around()
+        for publisher, column in self._heard_scalars:
+            publisher.publish(encode_number(samples[-1, column]))
+        if not self._timed:
+            return
+        last, stamp = samples[-1], stamp_of_last()
         if self._follows:
             self._follow(stamp - round(last[_TIME] * 1e9))
-        for publisher, column in self._heard_scalars:
-            publisher.publish(encode_number(last[column]))
         if self._heard_joints:
             when = stamp if self._now is None else self._now().nanoseconds
             self._joints.publish(joint_states(last, when))
@@ -112,12 +127,10 @@ class LatheTopics:
 
     def _look_around(self) -> None:
         """See from time to time who listens: to ask at each tick costs as much as a sample."""
-        now = time.monotonic()
-        if now - self._looked_around >= _LOOK_AROUND:
-            self._looked_around = now
-            self._log.look()
-            self._heard_scalars = [s for s in self._scalars if s[0].get_subscription_count()]
-            self._heard_joints = self._joints.get_subscription_count() > 0
+        self._log.look()
+        self._heard_scalars = [s for s in self._scalars if s[0].get_subscription_count()]
+        self._heard_joints = self._joints.get_subscription_count() > 0
+        self._timed = self._follows or self._heard_joints or self._clock is not None
 
     def readers(self) -> int:
         """How many readers of the samples the publisher has met: they miss none from now on."""

@@ -24,13 +24,17 @@ import platform
 import struct
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from rclpy.context import Context
-from rclpy.executors import Executor
+from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 
+RCLError: type[Exception] = rclpy_implementation.RCLError
 SECOND = 1_000_000_000
+NEVER = 1 << 63
+"""Later than any time, ns."""
 LOOK_UP = 0.1
 """s after which a node that nothing happens to looks whether it was told to end."""
 SERVE_PERIOD = 10_000_000
@@ -39,6 +43,7 @@ _MARGIN = 500_000
 """ns before the next tick in which the executor does not wait any more: it may come back late."""
 _LEAST_SHARE = 1_000_000
 """ns that requests may take where the ticks since the last of them took less."""
+_LOOK_UP = int(SECOND * LOOK_UP)
 _SET_ATTRIBUTES = {'x86_64': 314, 'aarch64': 274}
 _SLICE = 100_000
 """ns, the shortest that Linux gives."""
@@ -50,6 +55,7 @@ class Pacer:
 
     Attributes:
         tick: Simulated duration of a tick, ns.
+        period: From one tick to the next, ns of the clock.
         factor: Simulated seconds per second of the clock, > 0.
         patience: The most that may be caught up in one go, ns of the clock.
         keeps_all: Whether the excess is not given up but made later: where the clock is
@@ -64,13 +70,13 @@ class Pacer:
     keeps_all: bool = False
     lag: float = 0.0
     overruns: int = 0
+    period: float = field(init=False)
     _origin: float | None = None
     _done: int = 0
 
-    @property
-    def period(self) -> float:
-        """From one tick to the next, ns of the clock."""
-        return self.tick / self.factor
+    def __post_init__(self) -> None:
+        """See the class."""
+        self.period = self.tick / self.factor
 
     def start(self, now: int) -> None:
         """Let the next tick be due one period from now: at first, and after a pause."""
@@ -96,7 +102,7 @@ class Pacer:
     def change(self, factor: float, now: int) -> None:
         """Go on with another factor, as late as it is."""
         late = self.lateness(now)
-        self.factor = factor
+        self.factor, self.period = factor, self.tick / factor
         self.start(now)
         self._origin = now - late
 
@@ -122,12 +128,12 @@ class Pacer:
         """Let ticks that were due, and counted as made, be due again: there was no time."""
         self._done -= ticks
 
-    def next_wake(self, now: int) -> int:
+    def next_wake(self) -> int:
         """When to call next: when the next tick is due, but no sooner than after a tick's time.
 
         At a factor above 1 several ticks are made in one go.
         """
-        return now - int(self.lateness(now) - max(self.period, self.tick))
+        return int((self._origin or 0.0) + self._done * self.period + max(self.period, self.tick))
 
     def lateness(self, now: int) -> float:
         """How long ago the last tick that was made had been due, ns; negative if it is early."""
@@ -158,8 +164,8 @@ class Tickable(Protocol):
     context: Context
     requests: RequestLoad
 
-    def next_wake(self) -> int | None:
-        """When `wake` wants to be called, ns of time.monotonic_ns(); None for not by time."""
+    def next_wake(self) -> int:
+        """When `wake` wants to be called, ns of time.monotonic_ns(); NEVER for not by time."""
 
     def wake(self) -> None:
         """Do what is due."""
@@ -202,48 +208,44 @@ class Served:
         executor: Serves its requests.
         node: Which; its times come first.
         serve_period: ns after which the executor looks for requests that nobody knows of.
+        serve_at: When it does next, ns of time.monotonic_ns().
+        spent: What waking it took since, ns.
     """
 
     executor: Executor
     node: Tickable
     serve_period: int = SERVE_PERIOD
-    _serve_at: int = 0
-    _spent: int = 0
+    serve_at: int = 0
+    spent: int = 0
 
-    def serve(self, until: int) -> None:
-        """Serve what waits, and what comes until then, ns of time.monotonic_ns()."""
-        now = time.monotonic_ns()
-        if now >= self._serve_at:
-            busy = _serve(self.executor, self.node.requests, until, self._spent)
-            self._serve_at, self._spent = 0 if busy else now + self.serve_period, 0
-            self.node.update_scheduling()
+    def serve(self, now: int, next_wake: int = 0) -> None:
+        """Serve what waits, and what comes before the next wake where that is long until then.
 
-    def wake(self) -> None:
-        """Wake it, and note what it took."""
-        began = time.monotonic_ns()
-        self.node.wake()
-        self._spent += time.monotonic_ns() - began
+        Else to wait here would be one more sleep that ends early, and costs as much as a tick.
+
+        Args:
+            now: ns of time.monotonic_ns().
+            next_wake: Likewise; 0 for not to wait.
+        """
+        until = next_wake - _MARGIN if next_wake - now > self.serve_period else 0
+        busy = _serve(self.executor, self.node.requests, until, self.spent)
+        self.serve_at, self.spent = 0 if busy else now + self.serve_period, 0
+        self.node.update_scheduling()
 
 
-def spin_in_ticks(
-    executor: Executor,
-    node: Tickable,
-    ended: Callable[[], bool],
-    serve_period: int = SERVE_PERIOD,
-) -> None:
+def spin_in_ticks(executor: Executor, node: Tickable, ended: Callable[[], bool]) -> None:
     """Wake and serve a node until `ended` says so or its context is shut down.
 
     Args:
         executor: Serves its requests.
         node: Which; its times come first.
         ended: Looked at after each tick, and ten times a second while there is none.
-        serve_period: ns after which the executor looks for requests that nobody knows of.
     """
-    spin_together([Served(executor, node, serve_period)], ended)
+    spin_together([Served(executor, node)], ended)
 
 
 def spin_together(served: Sequence[Served], ended: Callable[[], bool]) -> None:
-    """Wake and serve several nodes of one context.
+    """Wake and serve several nodes of one context, until `ended` says so or it is shut down.
 
     Args:
         served: The first of them is waited with for requests; the others are looked after.
@@ -252,24 +254,34 @@ def spin_together(served: Sequence[Served], ended: Callable[[], bool]) -> None:
     for each in served:
         each.executor.add_node(each.node)
     try:
-        while served[0].node.context.ok() and not ended():
-            times = [each.node.next_wake() for each in served]
-            next_look = time.monotonic_ns() + int(SECOND * LOOK_UP)
-            earliest = min([at for at in times if at is not None] + [next_look])
-            for each in served[:0:-1]:
-                each.serve(until=0)
-            served[0].serve(until=earliest - _MARGIN)
-            left = earliest - time.monotonic_ns()
-            if left > 0:
-                time.sleep(left / SECOND)
-            now = time.monotonic_ns()
-            for each, at in zip(served, times, strict=True):
-                if at is not None and at <= now:
-                    each.wake()
+        _spin(served, ended)
+    except (ExternalShutdownException, RCLError):  # the one when serving, the other in a tick
+        if served[0].node.context.ok():
+            raise
     finally:
         for each in served:
             each.executor.remove_node(each.node)
             each.executor.shutdown()
+
+
+def _spin(served: Sequence[Served], ended: Callable[[], bool]) -> None:
+    """Go round 500 times a second: each call of a function here takes a thousandth of a core."""
+    while not ended():
+        times = [each.node.next_wake() for each in served]
+        now = time.monotonic_ns()
+        earliest = min(now + _LOOK_UP, *times)
+        for each in reversed(served):
+            if now >= each.serve_at:
+                each.serve(now, earliest if each is served[0] else 0)
+        left = earliest - time.monotonic_ns()
+        if left > 0:
+            time.sleep(left / SECOND)
+        now = time.monotonic_ns()
+        for at, each in zip(times, served, strict=True):
+            if at <= now:
+                each.node.wake()
+                now, before = time.monotonic_ns(), now
+                each.spent += now - before
 
 
 def _serve(executor: Executor, requests: RequestLoad, until: int, spent: int) -> bool:

@@ -35,36 +35,31 @@ class RunControl:
     """The states above.
 
     Attributes:
+        state: Whether simulated time goes on.
         ended_because: The sentence of the guard, empty unless ENDED.
         resets: How many there were.
     """
 
     def __init__(self) -> None:
         """Begin RUNNING."""
-        self._paused = False
+        self.state = self._before_the_end = RunState.RUNNING
         self.ended_because = ''
         self.resets = 0
-
-    @property
-    def state(self) -> RunState:
-        """Whether simulated time goes on."""
-        if self.ended_because:
-            return RunState.ENDED
-        return RunState.PAUSED if self._paused else RunState.RUNNING
 
     def pause(self, *, pause: bool) -> Answer:
         """Pause or resume; asking for what is so already is no error."""
         if self.ended_because:
             return Answer(done=False, message=f'{self.ended_because} Only a reset helps.')
-        before, self._paused = self._paused, pause
-        word = 'paused' if pause else 'running'
-        return Answer(done=True, message=f'Already {word}.' if before == pause else f'Now {word}.')
+        before, self.state = self.state, RunState.PAUSED if pause else RunState.RUNNING
+        word = self.state.value
+        known = before is self.state
+        return Answer(done=True, message=f'Already {word}.' if known else f'Now {word}.')
 
     def may_step(self) -> Answer:
         """Whether one tick may be made by hand."""
         if self.ended_because:
             return Answer(done=False, message=f'{self.ended_because} Only a reset helps.')
-        if not self._paused:
+        if self.state is not RunState.PAUSED:
             return Answer(done=False, message='A step is possible only while paused.')
         return Answer(done=True, message='One tick.')
 
@@ -75,10 +70,12 @@ class RunControl:
             because: Its sentence, not empty.
         """
         self.ended_because = because
+        self.state, self._before_the_end = RunState.ENDED, self.state
 
     def reset(self) -> Answer:
         """Start again at time zero, paused where it was paused."""
-        self.ended_because = ''
+        if self.ended_because:
+            self.ended_because, self.state = '', self._before_the_end
         self.resets += 1
         return Answer(done=True, message=f'At time zero again, {self.state.value}.')
 

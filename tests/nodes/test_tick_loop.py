@@ -43,6 +43,20 @@ def test_it_ticks_by_the_clock(lathe: LatheNode) -> None:
     assert lathe.samples_taken / 1e4 <= time.monotonic() - began + 0.001
 
 
+def test_it_ends_with_its_context(lathe: LatheNode, context: Context) -> None:
+    looks = 0
+
+    def shut_down() -> bool:
+        nonlocal looks
+        looks += 1
+        if looks == 10:
+            context.shutdown()
+        return looks > 1000
+
+    spin_in_ticks(make_executor(lathe), lathe, shut_down)
+    assert 10 <= looks < 1000
+
+
 @pytest.mark.parametrize('factor', [0.0, 0.5, 1.0, 10.0])
 def test_requests_are_served_between_ticks_and_in_a_pause(lathe: LatheNode, factor: float) -> None:
     # The node is its own client: one thread serves both.
@@ -76,8 +90,8 @@ def test_where_ticks_leave_no_time_requests_have_as_much_as_the_ticks(lathe: Lat
             before, goes = lathe.requests.served, 0
             while lathe.requests.served < before + 100:
                 # Ticks that took a second each, and are due again at once.
-                served._spent = int(1e9)
-                served.serve(until=0)
+                served.spent = int(1e9)
+                served.serve(time.monotonic_ns())
                 goes += 1
                 assert goes < 10, f'{lathe.requests.served - before} of 100 served'
             assert lathe.requests.served >= expected
