@@ -121,11 +121,12 @@ def take_hops(
     done, hop = 0, settings.hop
     model = settings.has_machine != 0 and settings.believed != REJECTED
     count = block.shape[0] // hop
-    turns = kernels.poles ** (hop // settings.thinning)
-    centres = np.empty(kernels.poles.size)
-    for j in range(centres.size):
-        pole = kernels.poles[j]
-        centres[j] = math.atan2(pole.imag, pole.real) * (settings.rate / settings.thinning)
+    turns, centres = memory.turns, memory.centres
+    if centres[0] == 0.0:  # once: it takes as long as a hop
+        for j in range(centres.size):
+            pole = kernels.poles[j]
+            turns[j] = pole ** (hop // settings.thinning)
+            centres[j] = math.atan2(pole.imag, pole.real) * (settings.rate / settings.thinning)
     lengths = WINDOWS.copy()
     while done < count:
         samples = block[done * hop : (done + 1) * hop]

@@ -175,10 +175,9 @@ class BandDetector:
     @property
     def weight(self) -> tuple[int, float]:
         """How much it has to say: what is most serious, and loudest of those."""
-        now = self.state.now[0]
-        amplitude = float(now.amplitude)
+        amplitude = float(self._now['amplitude'])
         loudness = amplitude if math.isfinite(amplitude) else 0.0
-        return SERIOUSNESS[int(now.state)], loudness
+        return SERIOUSNESS[int(self._now['state'])], loudness
 
     def line_known(self, place: int) -> bool:
         """Whether the mean power of a resonator is one of long enough."""

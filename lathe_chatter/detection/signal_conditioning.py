@@ -67,6 +67,8 @@ class Memory(NamedTuple):
         history: Thinned samples (HISTORY_ROWS, capacity).
         counts: One record.
         resonators: (bins,).
+        turns: Their poles over a hop (bins,), written by who first needs them.
+        centres: Their angular frequencies, rad/s (bins,), likewise.
         phases: Once-per-turn statistics (PHASE_ROWS, PHASES).
         fit: Of the tool's equation.
     """
@@ -74,6 +76,8 @@ class Memory(NamedTuple):
     history: Array
     counts: Records
     resonators: Complex
+    turns: Complex
+    centres: Array
     phases: Array
     fit: FitSums
 
@@ -85,6 +89,8 @@ def new_memory(turn: float, kernels: Kernels, stride: int) -> Memory:
         np.zeros((HISTORY_ROWS, 2 * keep)),
         record(_COUNTS),
         np.zeros(kernels.poles.size, complex),
+        np.zeros(kernels.poles.size, complex),
+        np.zeros(kernels.poles.size),
         np.zeros((PHASE_ROWS, PHASES)),
         new_sums(kernels, stride),
     )

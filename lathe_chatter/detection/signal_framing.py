@@ -86,6 +86,7 @@ class Framer:
         self._step = math.nan
         self._last = math.nan
         self._dead: NDArray[np.bool_] = np.zeros(4, bool)
+        self._absent: list[int] = []
         self._names: tuple[str, ...] = ()
         self._places: NDArray[np.int64] = np.full(5, -1)
         self._incomplete = False
@@ -152,7 +153,8 @@ class Framer:
             self._filter.apply(block[:, 1:])
         if self._dead[2]:
             block[:, 1], block[:, 2] = block[:, 2], 0.0
-        block[:, [self._dead[1], False, self._dead[3]]] = 0.0
+        for place in self._absent:
+            block[:, place] = 0.0
         return block
 
     def _measure(self, rows: Array) -> StreamFormat | None:
@@ -172,6 +174,7 @@ class Framer:
         # Where no turn is seen nothing else takes away the mean.
         filtered = sensors.filtered or bool(self._dead[1])
         self._filter = MotionFilter(sensors.orders, rate) if filtered else None
+        self._absent = [place for place in (0, 2) if self._dead[place + 1]]
         angle, workpiece = not self._dead[1], not self._dead[2:].any()
         return StreamFormat(rate, angle, workpiece, sensors.mixed, self._told)
 

@@ -219,15 +219,16 @@ class Served:
     spent: int = 0
 
     def serve(self, now: int, next_wake: int = 0) -> None:
-        """Serve what waits, and what comes before the next wake where that is long until then.
+        """Serve what waits, and what comes before the next wake if more is likely to come.
 
-        Else to wait here would be one more sleep that ends early, and costs as much as a tick.
+        To wait in vain is one more sleep that ends early, and costs as much as a tick.
 
         Args:
             now: ns of time.monotonic_ns().
             next_wake: Likewise; 0 for not to wait.
         """
-        until = next_wake - _MARGIN if next_wake - now > self.serve_period else 0
+        waits = not self.serve_at or next_wake - now > self.serve_period
+        until = next_wake - _MARGIN if waits else 0
         busy = _serve(self.executor, self.node.requests, until, self.spent)
         self.serve_at, self.spent = 0 if busy else now + self.serve_period, 0
         self.node.update_scheduling()
