@@ -102,8 +102,9 @@ def shown_amplitude(
     if settings.has_angle != 0:
         cosine = math.cos(omega / speed)
         left = math.sqrt(2.0 * (1.0 - cosine) / (1.0 - 2.0 * keep * cosine + keep**2))
-    # Chatter is one line, of which that tells how much is left.
-    if not (left > _LEFT or (now.alarmed != 0 and left > _LEFT_OF_CHATTER)):
+    if now.alarmed != 0:  # chatter is one line, of which that tells how much is left
+        left = max(left, _LEFT_OF_CHATTER) if left == left else 1.0
+    elif not left > _LEFT:
         return np.nan
     power = count = 0.0
     for back in range(_SHOWN):
