@@ -273,7 +273,8 @@ def test_it_fits_the_screen_and_axe_has_nothing_to_say(
 
 def test_legends_follow_the_theme(browser: Browser) -> None:
     browser.until('plots.get("chart") && plots.get("displacement-0")', 'chart and signals')
-    marks = 'document.querySelectorAll("main .u-series:not(:first-child) .u-marker")'
+    mark = '.u-series:not(:first-child) .u-marker'
+    marks = f'document.querySelectorAll("#chart {mark}, #displacement-0 {mark}")'
     seen = []
     try:
         for dark in (False, True):
@@ -281,9 +282,8 @@ def test_legends_follow_the_theme(browser: Browser) -> None:
             browser.until(
                 f'matchMedia("(prefers-color-scheme: dark)").matches === {str(dark).lower()}', ''
             )
-            browser.until('colours.has("tool")', 'drawn anew')
             tool = browser.run(
-                '(e => { e.style.color = css("tool"); document.body.append(e); '
+                '(e => { e.style.color = "var(--tool)"; document.body.append(e); '
                 'const c = getComputedStyle(e).color; e.remove(); return c; })'
                 '(document.createElement("i"))'
             )
