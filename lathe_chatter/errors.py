@@ -133,7 +133,10 @@ class MissingPackageError(LatheChatterError):
 
     def __init__(self, name: str, use: str) -> None:
         """Name the library and what for."""
-        super().__init__(f'{use} needs {name}, which is not installed: `pip install {name}`.')
+        package = {'sdypy.EMA': 'sdypy-EMA'}.get(name, name.partition('.')[0])
+        super().__init__(
+            f'{use} needs {package}, which is not installed: `pip install {package}`.'
+        )
 
 
 def optional(name: str, use: str) -> Any:

@@ -31,7 +31,8 @@ from lathe_chatter.shipped_files import shipped_files
 _TURN = 2.0 * np.pi
 _SPEED = limits_of(Cut, 'spindle_speed_rpm')
 _MOST_ERROR = 10.0
-"""Relative standard error that is allowed."""
+_LEAST_ERROR = 1e-6
+"""Relative standard errors that are allowed: below, a percentage was meant."""
 _IN_FILE = {
     'bearing': {
         'stiffness': 'machine.bearing_stiffness',
@@ -310,6 +311,9 @@ def _errors(
         unit, size = ('', 1.0) if relative else (rows[name].unit, abs(values[name]) or 1.0)
         limits = Quantity('standard error', unit, high=_MOST_ERROR * size)
         found[name] = errors.value(name, node, Row('', 0.0, '', limits)) / size
+        if 0.0 < found[name] < _LEAST_ERROR:
+            said = f'{name} is {found[name]:.1g} of its value: it must be 0 or at least'
+            raise errors.refused(f'{said} {_LEAST_ERROR:g} of it, as 2 % is', node)
     return found
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.errors import ModalFitError
+from lathe_chatter.errors import optional
 from lathe_chatter.tap_test.measured_response import FrequencyResponse
 
 _POLE_ORDER = 40
@@ -22,16 +22,11 @@ def candidate_poles(responses: Sequence[FrequencyResponse]) -> list[tuple[float,
     """Poles (omega, zeta) of the first response by the complex frequency method, every order."""
     with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
         warnings.simplefilter('ignore')
-        try:
-            from sdypy import EMA
-        except ImportError:
-            raise ModalFitError(
-                "A tap test needs the package sdypy-EMA: pip install 'lathe_chatter[identify]'."
-            ) from None
+        model_of = optional('sdypy.EMA', 'a tap test').Model
         response, frequency = responses[0], responses[0].frequency
         receptance = response.response / response.of_receptance
         order = min(_POLE_ORDER, frequency.size // 8)
-        model = EMA.Model(
+        model = model_of(
             receptance[None, :], frequency, frf_form='receptance', pol_order_high=order,
             lower=float(frequency[0]), upper=float(frequency[-1]),
         )  # fmt: skip

@@ -24,10 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.errors import FrequencyResponseError, reason_of
+from lathe_chatter.errors import FrequencyResponseError, optional, reason_of
 
 Complex = NDArray[np.complex128]
 
+_LEAST = 16
+"""Frequencies of a response."""
 ORDERS = {'receptance': 0, 'mobility': 1, 'accelerance': 2}
 """How often the displacement was differentiated in what was measured."""
 
@@ -40,17 +42,14 @@ _MOTIONS = {
 } | dict.fromkeys(('g', 'gn'), ('accelerance', _G))
 """What is measured in a unit over that of the force, and the factor to SI."""
 _FORCES = {'n': 1.0, 'kn': 1e3, 'lbf': 4.4482216152605}
+_PER_HERTZ = {'': 1.0, 'hz': 1.0, 'khz': 1e-3, 'rad/s': 2.0 * np.pi}
 _UFF_ORDERS = {8: 0, 11: 1, 12: 2}
 """Specific data types of dataset 58: displacement, velocity, acceleration."""
 _UFF_FORCE, _UFF_FRF, _UFF_COHERENCE = 13, 4, 6
 _UFF_FUNCTIONS = {
-    1: 'a record over time',
-    2: 'an auto spectrum',
-    3: 'a cross spectrum',
-    _UFF_COHERENCE: 'a coherence',
-    9: 'a spectral density',
-    12: 'a spectrum',
-}
+    1: 'a record over time', 2: 'an auto spectrum', 3: 'a cross spectrum',
+    _UFF_COHERENCE: 'a coherence', 9: 'a spectral density', 12: 'a spectrum',
+}  # fmt: skip
 """What else dataset 58 may hold, by its number of the function."""
 
 
@@ -78,30 +77,35 @@ class FrequencyResponse:
         Raises:
             FrequencyResponseError: If lengths differ, values are not finite, or too few.
         """
+        parts = [p for p in (self.frequency, self.response, self.coherence) if p is not None]
+        falling = np.flatnonzero(np.diff(self.frequency.ravel(), prepend=-1e-300) <= 0.0)
+        largest, said = float(np.abs(self.response).max(initial=0.0)), ''
         if self.form not in ORDERS:
-            known = ', '.join(ORDERS)
-            raise FrequencyResponseError(
-                f'{self.source}: form is {self.form!r}: it must be one of {known}.'
+            said = f'its form is {self.form!r}: it must be one of {", ".join(ORDERS)}'
+        elif len({part.shape for part in parts}) != 1 or self.frequency.ndim != 1:
+            said = 'its columns are not of one length'
+        elif not all(np.isfinite(part).all() for part in parts):
+            said = 'it holds values that are not finite'
+        elif self.frequency.size < _LEAST:
+            said = f'it must hold at least {_LEAST} frequencies, and has {self.frequency.size}'
+        elif falling.size:
+            wrong = self.frequency[falling[0]]
+            said = (
+                f'its frequencies must ascend from 0 Hz, and {wrong:g} Hz is below the one before'
             )
-        parts = [self.frequency, self.response]
-        parts += [self.coherence] if self.coherence is not None else []
-        if len({part.shape for part in parts}) != 1 or self.frequency.ndim != 1:
-            raise FrequencyResponseError(f'{self.source}: its columns are not of one length.')
-        if not all(np.isfinite(part).all() for part in parts):
-            raise FrequencyResponseError(f'{self.source}: it holds values that are not finite.')
-        if self.frequency.size < 16 or np.any(np.diff(self.frequency) <= 0.0):
-            raise FrequencyResponseError(
-                f'{self.source}: it must hold at least 16 ascending frequencies, '
-                f'and has {self.frequency.size}.'
-            )
+        elif not 1e-30 < largest < 1e30:
+            said = f'the largest value of its {self.form} is {largest:g}: nothing was measured'
+        elif self.coherence is not None and np.any(np.abs(self.coherence - 0.5) > 0.5):
+            said = 'its coherence must be from 0 to 1'
+        if said:
+            raise FrequencyResponseError(f'{self.source}: {said}.')
 
     def within(self, lowest: float, highest: float) -> FrequencyResponse:
         """The same between two frequencies, Hz, and never at 0 Hz, where nothing vibrates."""
         inside = (self.frequency >= max(lowest, 1e-9)) & (self.frequency <= highest)
         coherence = None if self.coherence is None else self.coherence[inside]
-        return FrequencyResponse(
-            self.frequency[inside], self.response[inside], self.form, coherence, self.source
-        )
+        kept = self.frequency[inside], self.response[inside]
+        return FrequencyResponse(*kept, self.form, coherence, self.source)
 
     @property
     def of_receptance(self) -> Complex:
@@ -136,12 +140,7 @@ def read_frequency_responses(path: Path | str) -> list[FrequencyResponse]:
 
 def _universal(path: Path) -> Iterator[FrequencyResponse]:
     """Those of a universal file, each with the coherence of the same two points."""
-    try:
-        import pyuff
-    except ImportError:
-        raise FrequencyResponseError(
-            "Universal files need the package pyuff: pip install 'lathe_chatter[identify]'."
-        ) from None
+    pyuff = optional('pyuff', 'a universal file')
     try:
         with contextlib.redirect_stdout(None):  # pyuff prints some sets as it reads them
             sets: Any = pyuff.UFF(str(path)).read_sets()
@@ -233,13 +232,19 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
             f'such as {parts[0]} (m/N).'
         )
     form, scale = _unit(units[parts[0]], path, parts[0])
+    per_hertz = _PER_HERTZ.get(units['frequency'].lower())
+    if per_hertz is None or (parts[0] == 'real' and units['imaginary'] not in {'', units['real']}):
+        given = ', '.join(filter(None, units.values()))
+        allowed = 'Hz, kHz or rad/s, and the imaginary part in the unit of the real one'
+        raise FrequencyResponseError(
+            f'{path}: its head has the units {given}: the frequency must be in {allowed}.'
+        )
     table = np.array([_numbers(row, len(head), separator, f'{path}, line {k}') for k, row in rows])
     table = table.reshape(-1, len(head))
     first, second = (table[:, columns[name]] for name in parts)
     if parts[0] == 'magnitude':
         angle = second if units['phase'].lower().startswith('rad') else np.radians(second)
         first, second = first * np.cos(angle), first * np.sin(angle)
-    per_hertz = 2.0 * np.pi if units['frequency'] == 'rad/s' else 1.0
     frequency = table[:, columns['frequency']] / per_hertz
     coherence = table[:, columns['coherence']] if 'coherence' in columns else None
     yield FrequencyResponse(frequency, (first + 1j * second) * scale, form, coherence, str(path))
@@ -249,18 +254,16 @@ def _numbers(row: list[str], columns: int, separator: str, where: str) -> list[f
     """A row of the table; the comma of a decimal is a point."""
     if len(row) != columns:
         mark = {'\t': 'tabs'}.get(separator, repr(separator))
-        raise FrequencyResponseError(
-            f'{where}: it has {len(row)} of the {columns} columns that the head has, separated '
-            f'by {mark} as those of the head.'
-        )
+        said = f'it has {len(row)} of the {columns} columns that the head has, separated by {mark}'
+        raise FrequencyResponseError(f'{where}: {said} as those of the head.')
     return [_number(cell, where) for cell in row]
 
 
 def _number(cell: str, where: str) -> float:
-    try:
-        return float(cell.replace(',', '.'))
-    except ValueError:
-        raise FrequencyResponseError(f'{where}: {cell!r} is no number.') from None
+    with contextlib.suppress(ValueError):
+        if np.isfinite(value := float(cell.replace(',', '.'))):
+            return value
+    raise FrequencyResponseError(f'{where}: {cell!r} is no finite number.')
 
 
 _COLUMNS = ('frequency', 'real', 'imaginary', 'magnitude', 'phase', 'coherence')

@@ -121,9 +121,12 @@ def fit_modes(
             break
         best = (score, parameters)
     if best is None or (modes is not None and len(poles) < modes):
+        said = f'{len(poles)} of {modes} modes were' if modes else 'no mode was'
+        turned = best is None and _next_pole(fit, [], candidates, sign=-1.0)
+        hint = ' Its sign is reversed, as that of an accelerometer the other way round.'
         raise ModalFitError(
-            f'{band[0].source}: {modes or "no"} modes could not be found between '
-            f'{band[0].frequency[0]:g} and {band[0].frequency[-1]:g} Hz.'
+            f'{band[0].source}: {said} found between {band[0].frequency[0]:g} and '
+            f'{band[0].frequency[-1]:g} Hz.{hint if turned else ""}'
         )
     return fit.result(best[1], candidates)
 

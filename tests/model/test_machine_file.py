@@ -143,6 +143,9 @@ ONE_MODE = 'tool: {modes: [{frequency: 3, damping_ratio: 0.1, mass: 1%s}],\n'
         ('material: {process_damping: 1, errors: {process_damping: 1 %}}\n',
          ("errors: there is no 'process_damping'",)),
         ('spindle: {slowest_speed: slow}\n', ("slowest_speed is 'slow'", 'in rev/min, rpm')),
+        # A percentage that lacks its sign would make certain what is not known.
+        ('material: {cutting_coefficient: 1500 MPa, errors: {cutting_coefficient: 15}}\n',
+         ('line 1', 'cutting_coefficient is 1e-08 of its value', 'as 2 % is')),
         ('cut: {errors: {feed: 1 %}}\n', ("cut: there is no 'errors'",)),
         ('cut: {feed: 0.2 mm/s}\n', ("feed is '0.2 mm/s'", 'mm/rev')),
         ('cut: {feed_speed: 0.2 mm/rev}\n', ("feed_speed is '0.2 mm/rev'", 'mm/min')),

@@ -9,6 +9,8 @@ from support.tap_tests import tap_test
 from lathe_chatter.errors import FrequencyResponseError
 from lathe_chatter.tap_test import FrequencyResponse, read_frequency_responses
 
+HEAD = 'frequency (Hz),real (m/N),imaginary (m/N)\n'
+
 
 def write_csv(path: Path, head: str, *columns: np.ndarray, separator: str = ',') -> Path:
     rows = (separator.join(f'{value:.17g}' for value in row) for row in zip(*columns, strict=True))
@@ -59,6 +61,16 @@ def test_magnitude_and_phase_with_semicolons(tmp_path: Path) -> None:
     assert found.coherence is None
 
 
+def test_frequencies_in_kilohertz(tmp_path: Path) -> None:
+    truth = tap_test()
+    file = write_csv(
+        tmp_path / 'test.csv', 'frequency (kHz),real (m/N),imaginary (m/N)',
+        truth.frequency / 1e3, truth.response.real, truth.response.imag,
+    )  # fmt: skip
+    (found,) = read_frequency_responses(file)
+    np.testing.assert_allclose(found.frequency, truth.frequency, rtol=1e-12)
+
+
 def test_a_column_without_a_name_is_passed_over(tmp_path: Path) -> None:
     truth = tap_test()
     file = write_csv(
@@ -78,6 +90,13 @@ def test_a_column_without_a_name_is_passed_over(tmp_path: Path) -> None:
         ('frequency (Hz),real (m/N)\n1,2\n', 'no imaginary'),
         ('frequency (Hz),real (kg),imaginary (kg)\n1,2,3\n', "'kg'"),
         ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,x\n', "'x'"),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,inf\n', "line 2: 'inf'"),
+        ('frequency (rpm),real (m/N),imaginary (m/N)\n1,2,3\n', 'must be in Hz, kHz or rad/s'),
+        ('frequency (Hz),real (m/N),imaginary (m/s2/N)\n1,2,3\n', 'in the unit of the real one'),
+        (HEAD + ''.join(f'{30 - k},2,3\n' for k in range(20)), '29 Hz is below'),
+        (HEAD + ''.join(f'{k - 5},2,3\n' for k in range(20)), '-5 Hz is below'),
+        (HEAD + ''.join(f'{k},0,0\n' for k in range(20)), 'nothing was measured'),
+        (HEAD + ''.join(f'{k},1e200,0\n' for k in range(20)), 'nothing was measured'),
         ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n', 'at least 16'),
         ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2\n1,2,3\n', 'test.csv, line 2'),
         ('frequency (Hz),real (m/N),imaginary (m/N)\n', 'at least 16'),
@@ -85,7 +104,7 @@ def test_a_column_without_a_name_is_passed_over(tmp_path: Path) -> None:
             '# by hand\nfrequency (Hz);real (m/N);imaginary (m/N)\n\n3.0,1.0,2.0\n',
             "line 4: it has 1 of the 3 columns that the head has, separated by ';'",
         ),
-        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n1,2,x\n', "line 3: 'x' is no number"),
+        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n1,2,x\n', "line 3: 'x' is no finite number"),
         ('frequency,real,imaginary\n1,2,3\n', 'no unit of real: it must be there in parentheses'),
         ('frequency (Hz),magnitude (dB),phase (deg)\n1,2,3\n', "the unit of magnitude is 'dB'"),
     ],

@@ -5,7 +5,7 @@ import pytest
 from support.tap_tests import THREE_MODES, tap_test
 
 from lathe_chatter.errors import ModalFitError
-from lathe_chatter.tap_test import fit_modes
+from lathe_chatter.tap_test import FrequencyResponse, fit_modes
 
 pytest.importorskip('sdypy.EMA', reason='the extra `identify` is not installed')
 
@@ -86,8 +86,15 @@ def test_modes_closer_than_they_are_wide_are_warned_of() -> None:
     assert any('told apart' in said for said in fit.warnings)
 
 
+def test_a_response_with_its_sign_reversed_is_told_as_that() -> None:
+    sound = tap_test(floor=0.01)
+    turned = FrequencyResponse(sound.frequency, -sound.response, sound.form)
+    with pytest.raises(ModalFitError, match='Its sign is reversed'):
+        fit_modes([turned])
+
+
 def test_noise_alone_is_no_body() -> None:
-    with pytest.raises(ModalFitError, match='could not be found'):
+    with pytest.raises(ModalFitError, match='of 8 modes were found'):
         fit_modes([tap_test(((5000.0, 0.01, 1e9),), floor=1.0, seed=3)], modes=8)
     with pytest.raises(ModalFitError, match='from 1 to'):
         fit_modes([tap_test()], modes=0)
