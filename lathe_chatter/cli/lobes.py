@@ -39,7 +39,7 @@ from lathe_chatter.report.probability_chart import (
     SURE,
     cut_probability,
     probability_sentence,
-    probable_speeds,
+    telling_speeds,
 )
 from lathe_chatter.report.stability_chart import (
     chart_limits,
@@ -57,10 +57,10 @@ _SPEED = limits_of(Cut, 'spindle_speed_rpm')
 _DEPTH = Quantity(
     'top of the chart', 'm', high=limits_of(Cut, 'depth_of_cut').high, exclusive=True
 )
+_PROBABLE_MACHINES = 1000
 _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
-_PROBABLE_SPEEDS, _PROBABLE_MACHINES = 200, 1000
 _PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """At which JSON has the depth that is stable with them."""
 _SHALLOWEST = 1000.0
@@ -282,7 +282,7 @@ def _probability(
             config.machine,
             known,
             config.cut,
-            probable_speeds(limits, _PROBABLE_SPEEDS),
+            telling_speeds(limits),
             machines=_PROBABLE_MACHINES,
             tool_leaves_cut=config.setup.tool_leaves_cut,
             executor=wide.executor,

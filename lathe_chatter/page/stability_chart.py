@@ -11,6 +11,7 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import LATHE, cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.page.versioned_values import finite
+from lathe_chatter.report.probability_chart import telling_speeds
 from lathe_chatter.report.stability_chart import (
     chart_limits,
     chart_speeds,
@@ -22,7 +23,6 @@ from lathe_chatter.stability.probability import stability_probability
 
 LIMITS = ('depth_of_cut', 'open_limit', 'seated_limit', 'seating_line')
 _PROBABILITIES = (0.95, 0.5, 0.05)
-_MACHINES, _SPEEDS = 400, 120
 _OF_ITS_POINT = (
     'spindle_speed_rpm', 'depth_of_cut', 'speed_variation_amplitude', 'speed_variation_frequency',
 )  # fmt: skip
@@ -31,6 +31,7 @@ _MATTERS = [
     for row in LATHE
     if not row.only_samples and not row.node_only and row.name not in _OF_ITS_POINT
 ]
+_MACHINES = 400
 
 
 def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -91,10 +92,10 @@ def draw_chart(
     found['contact'] = cut.bearing_contact.value
     found['top'] = top_of_chart(cut, limits)
     if described is not None and described.uncertainty:
-        speeds = chart_speeds(low, high, _SPEEDS)
+        speeds = telling_speeds(limits)
         probable = stability_probability(
-            machine, described.uncertainty, cut, speeds, machines=_MACHINES,
-            tool_leaves_cut=tool_leaves_cut,
+            machine, described.uncertainty, cut, speeds,
+            machines=_MACHINES, tool_leaves_cut=tool_leaves_cut,
         )  # fmt: skip
         for share in _PROBABILITIES:
             depth = np.interp(found['speed'], speeds, probable.safe_depth(share))

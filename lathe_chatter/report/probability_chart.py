@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import argrelmin
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut
@@ -18,6 +17,11 @@ if TYPE_CHECKING:
 
 SURE = 0.95
 """The probability at which a depth is called safe."""
+_ABOVE, _BELOW = 0.01, 0.03
+"""By how much a line between two speeds may leave the limit to either side, relative."""
+_NARROW, _WIDE = 1 / 300, 1 / 150
+"""Of the width of a chart: lobes within the one need not be told apart; no gap is wider than the
+other."""
 _WORTH_A_WORD = 0.05
 """Share of the variance below which a figure is not named."""
 _ROWS = 200
@@ -61,27 +65,37 @@ def probability_sentence(cut: Cut, probability: StabilityProbability) -> str:
     return said
 
 
-def probable_speeds(limits: SafeLimit, count: int) -> Array:
-    """Speeds for a chart of probability: evenly spaced, but at each minimum of the limit.
+def telling_speeds(limits: SafeLimit) -> Array:
+    """Speeds between which the limit is a straight line, or lies above it in narrow lobes.
 
-    Where lobes are narrower than the spacing, the chart then shows the depth that is safe in all
-    of them, and not that of speeds that happen to lie between two.
+    What is computed at these and drawn along lines is nowhere deeper than what is stable.
 
     Args:
         limits: Of the machine as it is told, over rising speeds.
-        count: How many.
 
     Returns:
-        Rising from the first to the last of the limits' speeds, rev/min (count,).
+        Some of these speeds, with the first and the last, rev/min.
     """
-    speeds, depths = limits.spindle_speed_rpm, limits.depth_of_cut
-    found = np.linspace(speeds[0], speeds[-1], count)
-    lowest = argrelmin(depths)[0]
-    lowest = lowest[np.argsort(-depths[lowest], kind='stable')]  # the deepest of a cell comes last
-    cells = np.searchsorted(0.5 * (found[1:] + found[:-1]), speeds[lowest])
-    inside = (cells > 0) & (cells < count - 1)
-    found[cells[inside]] = speeds[lowest[inside]]
-    return found
+    speeds = limits.spindle_speed_rpm
+    depths = np.minimum(limits.depth_of_cut, 100.0 * limits.depth_of_cut.min())
+    narrow, wide = (share * (speeds[-1] - speeds[0]) for share in (_NARROW, _WIDE))
+
+    def leaves(begin: int, end: int) -> Array:
+        line = np.interp(speeds[begin : end + 1], speeds[[begin, end]], depths[[begin, end]])
+        return np.asarray(line / depths[begin : end + 1] - 1.0)
+
+    kept = [0]
+    while (here := kept[-1]) < len(speeds) - 1:
+        last = int(np.searchsorted(speeds, speeds[here] + narrow, side='right')) - 1
+        below = (end for end in range(last, here, -1) if leaves(here, end).max() <= _ABOVE)
+        there = next(below, here + 1)
+        while there + 1 < len(speeds) and speeds[there + 1] - speeds[here] <= wide:
+            left = leaves(here, there + 1)
+            if left.max() > _ABOVE or left.min() < -_BELOW:
+                break
+            there += 1
+        kept.append(there)
+    return np.asarray(speeds[kept])
 
 
 def draw_probability(axes: Axes, chart: StabilityProbability, depth_limit: float) -> None:

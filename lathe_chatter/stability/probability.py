@@ -139,4 +139,5 @@ def _shares(deviations: Array, limits: Array) -> Array:
     value, x = value - value.mean(axis=0), x - x.mean(axis=0)
     slope, *_ = np.linalg.lstsq(x, value, rcond=None)
     variance = np.maximum((value**2).sum(axis=0), 1e-300)
-    return np.asarray(np.clip((slope * (x.T @ value)) / variance, 0.0, 1.0).T)
+    shares = np.clip((slope * (x.T @ value)) / variance, 0.0, 1.0)
+    return np.asarray((shares / np.maximum(shares.sum(axis=0), 1.0)).T)

@@ -104,7 +104,10 @@ def test_a_column_without_a_name_is_passed_over(tmp_path: Path) -> None:
             '# by hand\nfrequency (Hz);real (m/N);imaginary (m/N)\n\n3.0,1.0,2.0\n',
             "line 4: it has 1 of the 3 columns that the head has, separated by ';'",
         ),
-        ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n1,2,x\n', "line 3: 'x' is no finite number"),
+        (
+            'frequency (Hz),real (m/N),imaginary (m/N)\n1,2,3\n1,2,x\n',
+            "line 3: 'x' is no finite number",
+        ),
         ('frequency,real,imaginary\n1,2,3\n', 'no unit of real: it must be there in parentheses'),
         ('frequency (Hz),magnitude (dB),phase (deg)\n1,2,3\n', "the unit of magnitude is 'dB'"),
     ],
