@@ -11,7 +11,7 @@ and turned into the coordinates of the regime's eigenvectors, measured from its 
 from __future__ import annotations
 
 import math
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,8 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.eigenvectors import Basis, basis_of, inverse_of, product
 from lathe_chatter.lathe.integrator.propagation import TERMS
-from lathe_chatter.lathe.integrator.surface import aligned
+from lathe_chatter.lathe.integrator.surface import aligned, between_nodes, hermite
+from lathe_chatter.lathe.integrator.surface_moments import MOMENTS
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 
@@ -78,6 +79,7 @@ class Constants(NamedTuple):
         rests: Where each such regime rests (2n,).
         rules: The coefficients of all regimes (REGIMES, ROWS, 2n).
         outputs: What their coordinates mean (REGIMES, 2n + 1, OUTPUTS).
+        answers: How they answer by derivatives (REGIMES, 2n, SERIES, SERIES_SIZE).
     """
 
     settings: Array
@@ -87,6 +89,7 @@ class Constants(NamedTuple):
     rests: dict[int, Array]
     rules: Array
     outputs: Array
+    answers: Array
 
 
 @lru_cache(maxsize=64)
@@ -97,6 +100,7 @@ def constants_of(setup: LatheSetup, cut: Cut, steps: int) -> Constants:
     rules = np.zeros((layout.REGIMES, layout.ROWS, width))
     outputs = np.zeros((layout.REGIMES, width + 1, layout.OUTPUTS))
     direct = np.zeros((layout.REGIMES, layout.DIRECT))
+    answers = np.zeros((layout.REGIMES, width, layout.SERIES, layout.SERIES_SIZE))
     matrices = np.zeros((layout.REGIMES, 2, width, width))
     bases, rests = {}, {}
     for regime in regimes_of(setup, cut):
@@ -104,16 +108,17 @@ def constants_of(setup: LatheSetup, cut: Cut, steps: int) -> Constants:
         bases[regime], rests[regime] = known.basis, known.rest
         rules[regime], outputs[regime] = known.rules, known.outputs
         direct[regime], matrices[regime] = known.direct, known.matrices
+        answers[regime] = known.answers
     moves = np.zeros((layout.REGIMES, layout.REGIMES, width + 1, width))
     for old, basis in bases.items():
         for new, other in bases.items():
             moves[old, new, :-1] = product(other.inverse, basis.vectors)
             shift = rests[old] - rests[new]
             moves[old, new, -1] = product(other.inverse, shift[:, None])[:, 0]
-    parts = [part.ravel() for part in (settings, rules, outputs, direct, moves, matrices)]
+    parts = [part.ravel() for part in (settings, rules, outputs, direct, answers, moves, matrices)]
     flat = aligned(sum(map(len, parts)))
     np.concatenate(parts, out=flat)
-    return Constants(settings, flat, shapes, bases, rests, rules, outputs)
+    return Constants(settings, flat, shapes, bases, rests, rules, outputs, answers)
 
 
 class _Regime(NamedTuple):
@@ -124,6 +129,7 @@ class _Regime(NamedTuple):
     rules: Array
     outputs: Array
     direct: Array
+    answers: Array
     matrices: Array
 
 
@@ -145,10 +151,11 @@ def _regime(machine: Machine, regime: int, *acting: float) -> _Regime:
     settings[list(_ACTING)] = acting
     step, width = settings[layout.STEP_LENGTH], 2 * len(shapes.frequency)
     rules, outputs = np.zeros((layout.ROWS, width)), np.zeros((width + 1, layout.OUTPUTS))
+    answers = np.zeros((width, layout.SERIES, layout.SERIES_SIZE))
     matrices = np.zeros((2, width, width))
     matrix, push = motion(machine, shapes, settings, regime)
     basis, rest = basis_in(machine, regime, *acting[:3]), _rest(matrix, push)
-    _fill_rules(shapes, settings, matrix, basis, regime, rules, matrices)
+    _fill_rules(shapes, settings, matrix, basis, regime, rules, answers, matrices)
     _fill_outputs(shapes, matrix, basis, rest, outputs)
     rules[layout.RELATIVE_RATE_ROW] = (
         outputs[:-1, layout.TOOL_V] - outputs[:-1, layout.WORKPIECE_V]
@@ -160,7 +167,7 @@ def _regime(machine: Machine, regime: int, *acting: float) -> _Regime:
         below = product(shape[None], matrix[width // 2 :]) / (step * step)
         rules[row] = product(below, basis.vectors)[0]
     direct = _direct(shapes, settings, regime, basis)
-    return _Regime(basis, rest, rules, outputs, direct, matrices)
+    return _Regime(basis, rest, rules, outputs, direct, answers, matrices)
 
 
 @lru_cache(maxsize=256)
@@ -280,9 +287,9 @@ def _rest(matrix: Array, push: Array) -> Array:
 
 def _fill_rules(
     shapes: Shapes, settings: Array, matrix: Array, basis: Basis, regime: int, rules: Array,
-    matrices: Array,
+    answers: Array, matrices: Array,
 ) -> None:  # fmt: skip
-    """Generators, inputs and the response to a whole step (ROWS, 2n), and as matrices."""
+    """Generators, inputs and the response to a whole step (ROWS, 2n), as series and matrices."""
     n = len(matrix) // 2
     pairs = np.append(np.arange(n, 2 * n), np.arange(n))
     everyone = np.arange(2 * n)
@@ -297,7 +304,7 @@ def _fill_rules(
     rules[layout.BY_SURFACE : layout.BY_UNBALANCE + 1] = inputs.T
     rules[layout.OWN] = basis.generator[everyone, everyone]
     rules[layout.PARTNER] = basis.generator[everyone, pairs]
-    powers = _hermite()
+    powers = hermite()
     held, starts = np.zeros((2 * n, 14, 6)), np.zeros((2 * n, 2 * n))
     held[:, :6] = inputs[:, layout.SURFACE, None, None] * powers.T
     held[:, 6:12] = inputs[:, layout.UNBALANCE_FORCE, None, None] * powers.T
@@ -306,39 +313,17 @@ def _fill_rules(
     state, forced = _whole_step(basis.generator, starts, held)
     rules[layout.STEP_SURFACE : layout.STEP_SURFACE + 12] = forced[:, :12].T
     rules[layout.STEP_TOOL_FORCE : layout.STEP_CUTTING_FORCE + 1] = forced[:, 12:].T
+    moved, power = inputs, basis.generator
+    for k in range(layout.SERIES_BEGIN, layout.SERIES_SIZE):
+        answers[:, : layout.OF_ITSELF, k] = moved
+        answers[:, layout.OF_ITSELF, k] = power[everyone, everyone]
+        answers[:, layout.OF_PARTNER, k] = power[everyone, pairs]
+        moved, power = product(basis.generator, moved), product(basis.generator, power)
+    moments = answers[:, layout.OF_SURFACE, layout.SERIES_BEGIN :][:, :MOMENTS]
+    rules[layout.STEP_MOMENT : layout.STEP_MOMENT + MOMENTS] = moments.T
     rules[layout.STEP_OWN] = state[everyone, everyone]
     rules[layout.STEP_PARTNER] = state[everyone, pairs]
     matrices[0], matrices[1] = basis.generator, state
-
-
-@cache
-def _hermite() -> Array:
-    """Coefficients (6,) of the quintics with one of u, u', u'' at either end 1 and the rest 0."""
-    result = np.zeros((6, 6))
-    for k, (u0, d0, e0, u1, d1, e1) in enumerate(np.eye(6)):
-        rise, steep, bend = u1 - u0 - d0 - 0.5 * e0, d1 - d0 - e0, e1 - e0
-        result[:, k] = (
-            u0, d0, 0.5 * e0, 10.0 * rise - 4.0 * steep + 0.5 * bend,
-            -15.0 * rise + 7.0 * steep - bend, 6.0 * rise - 3.0 * steep + 0.5 * bend,
-        )  # fmt: skip
-    return result
-
-
-@lru_cache(maxsize=64)
-def between_nodes(part: float) -> Array:
-    """What two nodes a step apart tell of the surface a part of the way on (3, 5).
-
-    Of its height over the first, its slope and its curvature: the weights of the rise, of the
-    slopes at either node and of the curvatures.
-    """
-    coefficients = _hermite()[:, [3, 1, 4, 2, 5]]
-    result = np.empty((3, 5))
-    for k in range(3):
-        total = np.zeros(5)
-        for power in range(5, k - 1, -1):
-            total = total * part + coefficients[power] * math.perm(power, k)
-        result[k] = total
-    return result
 
 
 def _whole_step(generator: Array, starts: Array, held: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from lathe_chatter.lathe.integrator import piece_plan as at
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.first_crossing import NEVER, first_crossing, may_turn_back
 from lathe_chatter.lathe.integrator.propagation import TERMS, WEIGHTS, quintic, solve_piece
-from lathe_chatter.lathe.integrator.simd_vectors import LANES, fma, lanes_at, put, spread
+from lathe_chatter.lathe.integrator.simd_vectors import LANES, before, fma, lanes_at, put, spread
 from lathe_chatter.lathe.integrator.state_layout import (
     BEARING_V,
     BEARING_X,
@@ -30,6 +30,7 @@ class Machine(NamedTuple):
     rules: Array  # (REGIMES, ROWS, 2n)
     outputs: Array  # (REGIMES, 2n + 1, OUTPUTS)
     direct: Array  # (REGIMES, DIRECT)
+    answers: Array  # (REGIMES, 2n SERIES, SERIES_SIZE)
     moves: Array  # (REGIMES, REGIMES, 2n + 1, 2n)
     matrices: Array  # (REGIMES, 2, 2n, 2n)
 
@@ -69,8 +70,9 @@ def solve_series(
     if scratch.forces[2] != 0.0:
         quintic(f0, g0 * duration, h0 * square, f1, g1 * duration, h1 * square, scratch.given, 1)
     return solve_piece(
-        z, duration, machine.rules[regime], machine.matrices[regime, 0], machine.direct[regime],
-        scratch.forces, scratch.given, scratch.series, scratch.work, scratch.end,
+        z, duration, machine.rules[regime], machine.answers[regime], machine.matrices[regime, 0],
+        machine.direct[regime], scratch.forces, scratch.given, scratch.series, scratch.work,
+        scratch.end,
     )  # fmt: skip
 
 
@@ -136,7 +138,7 @@ def _margin(
         if wide:
             high = fma(side * share, lanes_at(scratch.series, i, LANES), high)
     if of_chip:
-        low = fma(-side, lanes_at(scratch.given, 0, 1), low)
+        low = fma(-side, before(lanes_at(scratch.given, 0, 0)), low)
     scratch.margin[0, 0] = start
     put(scratch.margin, 0, 1, low * lanes_at(WEIGHTS, 0, 0))
     if wide:

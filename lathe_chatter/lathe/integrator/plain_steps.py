@@ -20,6 +20,7 @@ from lathe_chatter.lathe.integrator import step_block_layout as at
 from lathe_chatter.lathe.integrator.first_crossing import may_turn_back
 from lathe_chatter.lathe.integrator.output_samples import COLUMNS, add_runout, write_accelerations
 from lathe_chatter.lathe.integrator.piece_plan import by_time
+from lathe_chatter.lathe.integrator.propagation import turn_coupled
 from lathe_chatter.lathe.integrator.simd_vectors import (
     LANES,
     after,
@@ -38,8 +39,12 @@ from lathe_chatter.lathe.integrator.simd_vectors import (
 )
 from lathe_chatter.lathe.integrator.spindle import speed_and_slope, speed_curvature
 from lathe_chatter.lathe.integrator.surface_corners import bend_of, by_place, finish_corner
+from lathe_chatter.lathe.integrator.surface_moments import MOMENTS
 from lathe_chatter.lathe.integrator.surface_of_block import look_up, nodes_on_grid, surface_on_grid
 from lathe_chatter.lathe.integrator.unbalance import angle_at, unbalance_force
+
+_SLOW = 0.01
+"""Cycles a step up to which a varied speed meets a corner at its even part of a step."""
 
 
 @compiled(inline=True, borrows=True, apart=True, inner=True)
@@ -90,13 +95,14 @@ def take_plain_steps(
     unbalanced = settings[layout.UNBALANCE] != 0.0
     tool_noise, cut_noise = settings[layout.FORCE_NOISE], settings[layout.CUTTING_FORCE_NOISE]
     noisy = tool_noise != 0.0 or cut_noise != 0.0
+    regime, steps = counts[layout.REGIME], counts[layout.STEPS]
+    in_cut, touch = regime & layout.IN_CUT != 0, regime >> 1
     seed = int(settings[layout.SEED])
     tool_key = random_numbers.stream_key(seed, random_numbers.FORCE_STREAM)
     cut_key = random_numbers.stream_key(seed, random_numbers.CUTTING_FORCE_STREAM)
+    crosses = in_cut and frequency <= _SLOW
     accelerations = out.shape[1] > COLUMNS
     coupled = direct[layout.COUPLED] != 0.0
-    regime, steps = counts[layout.REGIME], counts[layout.STEPS]
-    in_cut, touch = regime & layout.IN_CUT != 0, regime >> 1
     origin, origin_low, turns = numbers[layout.ORIGIN], numbers[layout.ORIGIN_LOW], 1.0 / turn
 
     place, ahead = numbers[layout.PLACE], numbers[layout.AHEAD]
@@ -125,21 +131,26 @@ def take_plain_steps(
         on_tool = tool_noise * random_numbers.normal(tool_key, samples)
         between = cut_noise * random_numbers.normal(cut_key, samples)
     by_tool, by_cut = direct[layout.TOOL_FORCE], direct[layout.CUTTING_FORCE]
-    bend = bend_of(z, outputs, direct, u0, 0.0, 0.0, f0)
-    if counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0:
-        bend_now = bend_of(z, outputs, direct, u0, on_tool, between, f0)
+    bend, cornered = 0.0, counts[layout.CORNER] != 0 or counts[layout.SURFACE_CORNER] != 0
+    if noisy or cornered:
+        bend = bend_of(z, outputs, direct, u0, 0.0, 0.0, f0)
+    if cornered:
+        bend_now = bend + (by_tool * on_tool + by_cut * between)
         finish_corner(numbers, counts, nodes, settings, bend_now, speed, acceleration)
 
     while row < out.shape[0] and head + layout.SPARE < nodes.shape[1] and place < span:
         taken = min(LANES, (out.shape[0] - row) * steps - index)
-        speeds, changes, rises = spread(1.0), spread(0.0), spread(1.0)
+        speeds, changes, rises, crossed = spread(1.0), spread(0.0), spread(1.0), False
         on_grid = 0 if varied else nodes_on_grid(nodes, pointer + 1, place + 1.0, turn)
         if on_grid > 0:
             taken = min(taken, on_grid, int(span - place))
             heights, slopes, curvatures, afters = surface_on_grid(nodes, pointer + 1, settings)
             places, leads = counted(place + 1.0), spread(ahead)
         else:
-            taken = look_up(nodes, settings, pointer, place, ahead, phase, speed, taken, block)
+            taken, crossed = look_up(
+                nodes, settings, pointer, place, ahead, phase, speed, height, slope, curvature,
+                crosses, taken, block,
+            )  # fmt: skip
             if taken == 0:
                 break
             heights, slopes = lanes_at(block, at.HEIGHT, 0), lanes_at(block, at.SLOPE, 0)
@@ -191,6 +202,10 @@ def take_plain_steps(
             push = spread(0.0)
             if in_cut:
                 push = _answer(rules, layout.STEP_SURFACE, i, us, ds, es, u1, d1, e1)
+            if crossed:
+                for m in range(MOMENTS):
+                    of_corner = lanes_at(block, at.MOMENT + m, 0)
+                    push = fma(rules[layout.STEP_MOMENT + m, i], of_corner, push)
             if noisy:
                 push = fma(rules[layout.STEP_TOOL_FORCE, i], forces, push)
                 push = fma(rules[layout.STEP_CUTTING_FORCE, i], betweens, push)
@@ -200,7 +215,7 @@ def take_plain_steps(
         for i in range(2 * n):
             began[i] = z[i]
         if coupled:
-            _turn_coupled(step_matrix, z, moved)
+            turn_coupled(step_matrix, z, moved)
         else:
             for i in range(n):
                 x, y = turned_on(
@@ -383,16 +398,3 @@ def _answer(
     start = fma(rules[first, i], u0, fma(rules[first + 1, i], d0, rules[first + 2, i] * e0))
     end = fma(rules[first + 3, i], u1, fma(rules[first + 4, i], d1, rules[first + 5, i] * e1))
     return start + end
-
-
-@compiled(borrows=True, inner=True)
-def _turn_coupled(step_matrix: Array, z: Array, moved: Array) -> None:
-    """Take the steps of a block whose coordinates are all coupled: pushes in, coordinates out."""
-    for k in range(LANES):
-        for i in range(z.shape[0]):
-            total = moved[i, k]
-            for j in range(z.shape[0]):
-                total = fma(step_matrix[i, j], z[j], total)
-            moved[i, k] = total
-        for i in range(z.shape[0]):
-            z[i] = moved[i, k]

@@ -27,6 +27,7 @@ from lathe_chatter.lathe.integrator import simd_vectors_in_python as plain
 LANES = plain.LANES
 _DOUBLE, _INT = ir.DoubleType(), ir.IntType(64)
 _UNALIGNED = 8
+_EMPTY = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
 
 
 class _Vector(types.Type):  # type: ignore[misc]  # Numba has no types
@@ -59,13 +60,16 @@ def _part(builder: Any, lanes: Any, k: int) -> Any:
     return builder.extract_element(lanes, ir.Constant(ir.IntType(32), k))
 
 
+def _with_part(builder: Any, lanes: Any, value: Any, k: int) -> Any:
+    return builder.insert_element(lanes, value, ir.Constant(ir.IntType(32), k))
+
+
 def _in_all(builder: Any, kind: Any, value: Any) -> Any:
     """A value of a Numba type as lanes."""
     if kind is _NUMBERS or kind is _MASK:
         return value
-    empty = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
-    first = builder.insert_element(empty, value, ir.Constant(ir.IntType(32), 0))
-    return _shuffled(builder, first, empty, [0] * LANES)
+    first = _with_part(builder, _EMPTY, value, 0)
+    return _shuffled(builder, first, _EMPTY, [0] * LANES)
 
 
 def _lanes_of(builder: Any, signature: Any, values: Any) -> list[Any]:
@@ -73,19 +77,28 @@ def _lanes_of(builder: Any, signature: Any, values: Any) -> list[Any]:
     return [_in_all(builder, k, value) for k, value in zip(signature.args, values, strict=True)]
 
 
+def _called(builder: Any, name: str, values: Any) -> Any:
+    """What a function of LLVM makes of lanes, or of numbers."""
+    kind = values[0].type
+    name = f'llvm.{name}.{f"v{LANES}f64" if isinstance(kind, ir.VectorType) else "f64"}'
+    of = ir.FunctionType(kind, [kind] * len(values))
+    return builder.call(cgutils.get_or_insert_function(builder.module, of, name), values)
+
+
 def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
-    vector = isinstance(a.type, ir.VectorType)
-    name = f'llvm.fma.{f"v{LANES}f64" if vector else "f64"}'
-    of = ir.FunctionType(a.type, [a.type] * 3)
-    return builder.call(cgutils.get_or_insert_function(builder.module, of, name), [a, b, c])
+    return _called(builder, 'fma', [a, b, c])
+
+
+def _row(context: Any, builder: Any, kind: Any, array: Any, row: Any) -> Any:
+    """A pointer to the first number of a row."""
+    parts = context.make_array(kind)(context, builder, array)
+    stride = cgutils.unpack_tuple(builder, parts.strides, kind.ndim)[0]
+    return cgutils.pointer_add(builder, parts.data, builder.mul(row, stride))
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, row: Any, column: Any) -> Any:
     """A pointer to eight numbers of a row."""
-    parts = context.make_array(kind)(context, builder, array)
-    stride = cgutils.unpack_tuple(builder, parts.strides, kind.ndim)[0]
-    begin = cgutils.pointer_add(builder, parts.data, builder.mul(row, stride))
-    pointer = builder.gep(begin, [column])
+    pointer = builder.gep(_row(context, builder, kind, array, row), [column])
     return builder.bitcast(pointer, ir.VectorType(_DOUBLE, LANES).as_pointer())
 
 
@@ -147,6 +160,57 @@ def _spread(_typing: Any, value: Any) -> Any:  # noqa: ARG001
         return _in_all(builder, signature.args[0], values[0])
 
     return _NUMBERS(types.float64), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _six(
+    _typing: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any  # noqa: ARG001
+) -> Any:  # fmt: skip
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        lanes = _constant([0.0] * LANES)
+        for k, value in enumerate(values):
+            lanes = _with_part(builder, lanes, value, k)
+        return lanes
+
+    return _NUMBERS(*[types.float64] * 6), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _floored(_typing: Any, value: Any) -> Any:
+    kind = value if value is _NUMBERS else types.float64
+
+    def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        return _called(builder, 'floor', values)
+
+    return kind(kind), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _chosen(_typing: Any, which: Any, a: Any, b: Any) -> Any:
+    result = _NUMBERS if which is _MASK else types.float64
+    kinds = [kind if kind is _NUMBERS else types.float64 for kind in (a, b)]
+
+    def emit(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        if result is _NUMBERS:
+            values = _lanes_of(builder, signature, values)
+        return builder.select(*values)
+
+    return result(_MASK if which is _MASK else types.boolean, *kinds), emit
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # Numba
+def _gathered(_typing: Any, rows: Any, row: Any, columns: Any) -> Any:  # noqa: ARG001
+    def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        array, row, columns = values
+        lanes = _EMPTY
+        begin = _row(context, builder, signature.args[0], array, row)
+        for k in range(LANES):
+            column = builder.fptosi(_part(builder, columns, k), _INT)
+            value = builder.load(builder.gep(begin, [column]))
+            lanes = _with_part(builder, lanes, value, k)
+        return lanes
+
+    return _NUMBERS(rows, types.intp, _NUMBERS), emit
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # Numba
@@ -226,10 +290,10 @@ def _powers(_typing: Any, x: Any) -> Any:  # noqa: ARG001
         square = builder.fmul(x, x)
         fourth = builder.fmul(square, square)
         low = [x, square, builder.fmul(square, x), fourth]
-        lanes = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
+        lanes = _EMPTY
         for k in range(LANES):
             value = low[k] if k < 4 else builder.fmul(low[k - 4], fourth)
-            lanes = builder.insert_element(lanes, value, ir.Constant(ir.IntType(32), k))
+            lanes = _with_part(builder, lanes, value, k)
         return lanes
 
     return _NUMBERS(types.float64), emit
@@ -242,15 +306,13 @@ def _turned_on(
 ) -> Any:  # fmt: skip
     def emit(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
         own, partner, back, other_own, pushes, others, x, y = values
-        xs = ys = ir.Constant(ir.VectorType(_DOUBLE, LANES), ir.Undefined)
+        xs = ys = _EMPTY
         for k in range(LANES):
             push, other = _part(builder, pushes, k), _part(builder, others, k)
             moved = _fma(builder, partner, y, _fma(builder, own, x, push))
             y = _fma(builder, back, x, _fma(builder, other_own, y, other))
             x = moved
-            place = ir.Constant(ir.IntType(32), k)
-            xs = builder.insert_element(xs, x, place)
-            ys = builder.insert_element(ys, y, place)
+            xs, ys = _with_part(builder, xs, x, k), _with_part(builder, ys, y, k)
         return cgutils.pack_array(builder, [xs, ys])
 
     numbers = [types.float64] * 4 + [_NUMBERS] * 2 + [types.float64] * 2
@@ -328,14 +390,9 @@ def _negated(_context: Any, builder: Any, _signature: Any, values: Any) -> Any:
 
 
 lanes_at, put, put_samples = _load, _store, _store_samples
-spread, counted, after, before, lane = _spread, _counted, _after, _before, _lane
-fma, first_of, turned_on = _fused, _first_of, _turned_on
-total, powers = _total, _powers
+spread, six, counted, after, before = _spread, _six, _counted, _after, _before
+lane, fma, first_of, turned_on = _lane, _fused, _first_of, _turned_on
+total, powers, floored, chosen, gathered = _total, _powers, _floored, _chosen, _gathered
 smaller, larger = _choice('<'), _choice('>')
 if numba.config.DISABLE_JIT:
-    lanes_at, put, put_samples = plain.lanes_at, plain.put, plain.put_samples
-    spread, counted, after = plain.spread, plain.counted, plain.after
-    before, lane, fma = plain.before, plain.lane, plain.fma
-    first_of, turned_on = plain.first_of, plain.turned_on
-    total, powers = plain.total, plain.powers
-    smaller, larger = plain.smaller, plain.larger
+    globals().update((name, each) for name, each in vars(plain).items() if callable(each))

@@ -37,6 +37,11 @@ def spread(value: float) -> Any:
     return np.full(LANES, value)
 
 
+def six(*values: float) -> Any:
+    """Six numbers, and then zeros."""
+    return np.array([*values, 0.0, 0.0])
+
+
 def after(first: float, lanes: Any) -> Any:
     """`first`, and then all lanes but the last: what each step begins with."""
     return np.append(first, lanes[:-1])
@@ -55,6 +60,21 @@ def lane(lanes: Any, k: int) -> float:
 def fma(a: Any, b: Any, c: Any) -> Any:
     """a b + c, rounded once (in plain Python twice); lanes or numbers."""
     return a * b + c
+
+
+def floored(value: Any) -> Any:
+    """The next whole number below; of lanes or a number."""
+    return np.floor(value)
+
+
+def chosen(which: Any, a: Any, b: Any) -> Any:
+    """`a` where something is so, else `b`; lanes or numbers."""
+    return np.where(which, a, b)[()]
+
+
+def gathered(rows: Array, row: int, columns: Any) -> Any:
+    """Of a row the numbers in these eight columns."""
+    return rows[row, columns.astype(int)]
 
 
 def smaller(a: Any, b: Any) -> Any:

@@ -10,9 +10,10 @@ phi(t) - phi(t - tau) = 1 rev.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from lathe_chatter.compiled import compiled
-from lathe_chatter.lathe.integrator.simd_vectors import fma
+from lathe_chatter.lathe.integrator.simd_vectors import chosen, floored, fma
 
 _NEWTON_STEPS = 20
 _NEARLY = 1e-8
@@ -22,26 +23,23 @@ _C2, _C3, _C4, _C5, _C6, _C7, _C8 = (1.0 / math.factorial(2 * k) for k in range(
 
 
 @compiled(inline=True, borrows=True, inner=True)
-def sine_and_cosine(turns: float) -> tuple[float, float]:
-    """Of an angle in turns: by their series about the next quarter turn, to rounding.
+def sine_and_cosine(turns: Any) -> tuple[Any, Any]:
+    """Of an angle in turns, or of eight: by their series about the next quarter turn, to rounding.
 
     A library's functions have other last bits on another processor.
     """
-    rest = turns - math.floor(turns + 0.5)
-    quarter = math.floor(4.0 * rest + 0.5)
+    rest = turns - floored(turns + 0.5)
+    quarter = floored(4.0 * rest + 0.5)
     x = 2.0 * math.pi * (rest - 0.25 * quarter)
     y = x * x
     sine = fma(y, fma(y, fma(y, fma(y, fma(y, fma(y, -_S7, _S6), -_S5), _S4), -_S3), _S2), -_S1)
     sine = fma(x * y, sine, x)
     cosine = fma(y, fma(y, fma(y, fma(y, fma(y, fma(y, _C8, -_C7), _C6), -_C5), _C4), -_C3), _C2)
     cosine = fma(y, fma(y, cosine, -0.5), 1.0)
-    if quarter == 0.0:
-        return sine, cosine
-    if quarter == 1.0:
-        return cosine, -sine
-    if quarter == -1.0:
-        return -cosine, sine
-    return -sine, -cosine
+    ahead, behind = quarter == 1.0, quarter == -1.0
+    half, across = quarter * quarter == 4.0, ahead | behind
+    sine, cosine = chosen(across, cosine, sine), chosen(across, sine, cosine)
+    return chosen(half | behind, -sine, sine), chosen(half | ahead, -cosine, cosine)
 
 
 @compiled(borrows=True, inner=True)
@@ -82,7 +80,7 @@ def turned(
     if z > 0.3:
         lever = 3.0 * (sine_z - z * cosine_z) / (z2 * z)
     mean = base + 0.5 * slope * time
-    swing = mean * sine * sinc * time
+    swing: float = mean * sine * sinc * time
     swing += slope * cosine * lever * z * time * time / 6.0
     return even + amplitude * swing
 
@@ -92,8 +90,8 @@ def time_to_turn(
     angle: float, base: float, slope: float, amplitude: float, phase: float, frequency: float
 ) -> float:
     """Time in which the spindle turns `angle`, by Newton: `turned` is increasing."""
-    start, _ = speed_and_slope(base, slope, amplitude, phase, frequency)
-    time = angle / start
+    speed, gain = speed_and_slope(base, slope, amplitude, phase, frequency)
+    time = angle / (speed + 0.5 * gain * (angle / speed))
     for _ in range(_NEWTON_STEPS):
         miss = turned(time, base, slope, amplitude, phase, frequency) - angle
         speed, _ = speed_and_slope(
@@ -112,4 +110,5 @@ def speed_curvature(
     """The second derivative of Omega by time at phase `phase` (cycles) of the variation."""
     rate = 2.0 * math.pi * frequency
     sine, cosine = sine_and_cosine(phase)
-    return amplitude * rate * (2.0 * slope * cosine - base * rate * sine)
+    swing: float = 2.0 * slope * cosine - base * rate * sine
+    return amplitude * rate * swing

@@ -89,11 +89,19 @@ BEARING_ENGAGES, BEARING_RELEASES, TOOL_LEAVES, TOOL_ENTERS, NO_EVENT = 0, 1, 2,
     STEP_SURFACE,  # six rows: U, U', U'' at the start of the step, then at its end
     STEP_UNBALANCE,  # six rows: that force alike
     STEP_TOOL_FORCE, STEP_CUTTING_FORCE,  # a force held for the step
+    STEP_MOMENT,  # five rows: moments of what the surface has beside a quintic
     RELATIVE_RATE_ROW,  # r' of the coordinates
     TOOL_ACCELERATION, WORKPIECE_ACCELERATION,  # m/s2
-) = 0, 1, 2, 3, 4, 5, 6, 7, 8, 14, 20, 21, 22, 23, 24  # fmt: skip
+) = 0, 1, 2, 3, 4, 5, 6, 7, 8, 14, 20, 21, 22, 27, 28, 29  # fmt: skip
 ROWS = 32
 """With room, so that each regime begins a line of the processor's cache."""
+
+# How a coordinate answers (SERIES, SERIES_SIZE) by its derivatives: those of itself and partner
+# are generator^(k + 1), k = 0, 1 ..., those of an input generator^k input.
+OF_SURFACE, OF_TOOL_FORCE, OF_CUTTING_FORCE, OF_UNBALANCE, OF_ITSELF, OF_PARTNER = range(6)
+SERIES = 6
+SERIES_BEGIN, SERIES_SIZE = 8, 24
+"""Zeros before them: an input's derivative j begins to act j derivatives later."""
 
 # Columns of the outputs (2 n + 1, 8); the last row is the regime's rest.
 (

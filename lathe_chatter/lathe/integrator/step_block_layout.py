@@ -8,8 +8,11 @@ from __future__ import annotations
     PLACE, AHEAD, PHASE,  # as in state_layout.py
     SPEED, ACCELERATION, RISE,  # over the target speed, its change, steps turned
     NODE,  # at or before the place met
+    LEFT, EXACT, CORNER,  # the node before that place, 1 if the next is there, one in between
     ON_TOOL, BETWEEN,  # the random forces during the step, N
     TURNING, TURNING_RATE, TURNING_BEND,  # the force of an unbalance, by time
-    SAMPLE,  # the eight columns of a sample
-) = range(17)  # fmt: skip
+    MOMENT,  # five of a corner that is met inside the step, see surface_moments.py
+) = range(20)  # fmt: skip
+SAMPLE = MOMENT + 5
+"""The eight columns of a sample."""
 ROWS = SAMPLE + 8

@@ -205,10 +205,12 @@ def advance(
     outputs = flat[first:last].reshape((regimes, n2 + 1, layout.OUTPUTS))
     first, last = last, last + regimes * layout.DIRECT
     direct = flat[first:last].reshape((regimes, layout.DIRECT))
+    first, last = last, last + regimes * n2 * layout.SERIES * layout.SERIES_SIZE
+    answers = flat[first:last].reshape((regimes, n2 * layout.SERIES, layout.SERIES_SIZE))
     first, last = last, last + regimes * regimes * (n2 + 1) * n2
     moves = flat[first:last].reshape((regimes, regimes, n2 + 1, n2))
     matrices = flat[last:].reshape((regimes, 2, n2, n2))
-    machine = Machine(rules, outputs, direct, moves, matrices)
+    machine = Machine(rules, outputs, direct, answers, moves, matrices)
     width = (n2 + _LINE - 1) // _LINE * _LINE
     series = _SMALL + 2 * width
     moved = series + n2 * TERMS

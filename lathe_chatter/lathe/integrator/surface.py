@@ -14,11 +14,14 @@ a force: after a few turns it is smoother than a quintic can tell, and is droppe
 from __future__ import annotations
 
 import math
+from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
+from lathe_chatter.lathe.integrator.simd_vectors import LANES, lanes_at, put
 
 # Rows: those of many nodes lie side by side, and are read and written together (simd_vectors.py).
 (
@@ -78,12 +81,45 @@ def fresh_surface(offset: float, turn: float, capacity: int) -> Array:
     return nodes
 
 
+@cache
+def hermite() -> Array:
+    """Coefficients (6,) of the quintics with one of u, u', u'' at either end 1 and the rest 0."""
+    result = np.zeros((6, 6))
+    for k, (u0, d0, e0, u1, d1, e1) in enumerate(np.eye(6)):
+        rise, steep, bend = u1 - u0 - d0 - 0.5 * e0, d1 - d0 - e0, e1 - e0
+        result[:, k] = (
+            u0, d0, 0.5 * e0, 10.0 * rise - 4.0 * steep + 0.5 * bend,
+            -15.0 * rise + 7.0 * steep - bend, 6.0 * rise - 3.0 * steep + 0.5 * bend,
+        )  # fmt: skip
+    return result
+
+
+@lru_cache(maxsize=64)
+def between_nodes(part: float) -> Array:
+    """What two nodes a step apart tell of the surface a part of the way on (3, 5).
+
+    Of its height over the first, its slope and its curvature: the weights of the rise, of the
+    slopes at either node and of the curvatures.
+    """
+    coefficients = hermite()[:, [3, 1, 4, 2, 5]]
+    result = np.empty((3, 5))
+    for k in range(3):
+        total = np.zeros(5)
+        for power in range(5, k - 1, -1):
+            total = total * part + coefficients[power] * math.perm(power, k)
+        result[k] = total
+    return result
+
+
 @compiled(inline=True, borrows=True, inner=True)
 def quintic_at(
-    place0: float, height0: float, slope0: float, curvature0: float,
-    place1: float, height1: float, slope1: float, curvature1: float, at: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """S and its first two derivatives at place `at` on the quintic with these values at two."""
+    place0: Any, height0: Any, slope0: Any, curvature0: Any,
+    place1: Any, height1: Any, slope1: Any, curvature1: Any, at: Any,
+) -> tuple[Any, Any, Any]:  # fmt: skip
+    """S and its first two derivatives at place `at` on the quintic with these values at two.
+
+    Of numbers, or of eight quintics.
+    """
     width = place1 - place0
     per_width = 1.0 / width
     place = (at - place0) * per_width
@@ -134,11 +170,14 @@ def forget(nodes: Array, first: int, last: int, shift: float) -> None:
     Small numbers have small rounding, so an hour of cutting is as exact as its first second; and
     the memory is that of a few turns.
     """
+    size = last + 1 - first
+    whole = size - size % LANES
     for entry in range(NODE_SIZE):
-        for node in range(first, last + 1):
-            nodes[entry, node - first] = nodes[entry, node]
-    for node in range(last + 1 - first):
-        nodes[PLACE, node] -= shift
+        moved = shift if entry == PLACE else 0.0
+        for node in range(0, whole, LANES):
+            put(nodes, entry, node, lanes_at(nodes, entry, first + node) - moved)
+        for node in range(whole, size):
+            nodes[entry, node] = nodes[entry, first + node] - moved
 
 
 def recounted(nodes: Array, start: float, ratio: float, ahead: float, feeds: Array) -> Array:

@@ -15,11 +15,12 @@ from lathe_chatter.lathe.integrator import propagation
 from lathe_chatter.lathe.integrator import state_layout as layout
 from lathe_chatter.lathe.integrator.coefficients import (
     Constants,
-    between_nodes,
     constants_of,
     motion,
 )
 from lathe_chatter.lathe.integrator.propagation import TERMS
+from lathe_chatter.lathe.integrator.state_layout import SERIES_SIZE
+from lathe_chatter.lathe.integrator.surface import between_nodes
 from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 
@@ -78,8 +79,8 @@ def _solved(
     direct[layout.COUPLED], direct[layout.RATE] = float(not basis.in_pairs), basis.rate
     forces = np.array([_TOOL_FORCE, _BETWEEN, 1.0, 0.0, 0.0, 0.0])
     wide = solve_piece(
-        z, duration, constants.rules[regime], basis.generator, direct, forces, given, series,
-        work, end,
+        z, duration, constants.rules[regime], constants.answers[regime].reshape((-1, SERIES_SIZE)),
+        basis.generator, direct, forces, given, series, work, end,
     )  # fmt: skip
     return end, series, wide
 
@@ -143,7 +144,7 @@ def test_only_nearly_equal_eigenvalues_stay_coupled() -> None:
 
 def test_the_quintic_has_the_given_values_slopes_and_curvatures() -> None:
     given = [0.3, -1.0, 2.0, 0.7, -1.3, 0.4]
-    derivatives = np.zeros((1, 6))
+    derivatives = np.zeros((1, 8))
     quintic(*given, derivatives, 0)
     p = Polynomial([d / math.factorial(k) for k, d in enumerate(derivatives[0])])
     found = [q(place) for place in (0.0, 1.0) for q in (p, p.deriv(), p.deriv(2))]
@@ -153,7 +154,7 @@ def test_the_quintic_has_the_given_values_slopes_and_curvatures() -> None:
 @pytest.mark.parametrize('part', [0.0, 0.3, 0.999])
 def test_the_weights_between_two_nodes_are_those_of_the_quintic(part: float) -> None:
     given = [0.3, -1.0, 2.0, 0.7, -1.3, 0.4]
-    derivatives = np.zeros((1, 6))
+    derivatives = np.zeros((1, 8))
     quintic(*given, derivatives, 0)
     p = Polynomial([d / math.factorial(k) for k, d in enumerate(derivatives[0])])
     u0, d0, e0, u1, d1, e1 = given

@@ -16,10 +16,10 @@ from lathe_chatter.lathe.integrator import simd_vectors_in_python as plain
 from lathe_chatter.lathe.integrator.simd_vectors import LANES
 
 
-def _made_of(own: Any) -> Callable[[Array, Array], tuple[int, int, float, float]]:
+def _made_of(own: Any) -> Callable[[Array, Array], tuple[int, int, float, float, float]]:
     """A function that uses all of simd_vectors.py, or of its double."""
 
-    def everything(given: Array, out: Array) -> tuple[int, int, float, float]:
+    def everything(given: Array, out: Array) -> tuple[int, int, float, float, float]:
         x, y = own.lanes_at(given, 0, 1), own.lanes_at(given, 1, 2)
         z = own.fma(2.0, x, y) - 1.0 / y
         own.put(out, 0, 3, -z)
@@ -31,10 +31,14 @@ def _made_of(own: Any) -> Callable[[Array, Array], tuple[int, int, float, float]
             own.powers(0.7),
         )  # fmt: skip
         own.put_samples(out, 4, rows)
+        own.put(out, 3, 8, own.six(1.0, 2.0, 3.0, 4.0, 5.0, given[0, 0]))
+        own.put(out, 1, 8, own.gathered(given, 1, own.floored(8.0 * x)))
+        own.put(out, 0, 0, own.chosen(x < 0.5, own.chosen(x > y, x, 4.0), own.floored(-3.0 * y)))
         happens = ((x < 0.2) & (z > 0.0)) | (y == 5.0) | (y <= 0.01)
         return (
             own.first_of(happens), own.first_of(x > own.spread(2.0)), own.lane(z, 3),
-            own.total(x * y),
+            own.total(x * y) + own.floored(-9.0 * given[0, 0]),
+            own.chosen(given[0, 0] < given[0, 1], 3.0, given[1, 1]),
         )  # fmt: skip
 
     return everything
