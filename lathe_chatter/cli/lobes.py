@@ -151,7 +151,7 @@ def run(options: Namespace) -> int:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
     say_what_is_assumed(config.described, screen, config.machine)
-    for sentence in _beyond_the_spindle(config, low, high):
+    for sentence in _doubts(config, limits):
         screen.say(f'WARNING  {sentence}')
     figures = _figures(config, limits, growth)
     if probability is not None and known:
@@ -177,11 +177,24 @@ def _is_cut_known(config: LatheConfig) -> bool:
     return config.described is None or told != (usual.spindle_speed_rpm, usual.depth_of_cut)
 
 
-def _beyond_the_spindle(config: LatheConfig, low: float, high: float) -> Iterator[str]:
-    """That cut or chart need speeds which the spindle has not, as its file says."""
+def _doubts(config: LatheConfig, limits: SafeLimit) -> Iterator[str]:
+    """What a machine's own file leads one to doubt: the coefficient, the feed, or the speeds."""
     described, cut = config.described, config.cut
+    deepest, lowest = limits_of(Cut, 'depth_of_cut').high, float(np.min(limits.open_limit))
+    if deepest < lowest < math.inf:
+        yield (
+            f'No cut is as deep as the lowest limit, {lowest:.3g} m: is the cutting coefficient, '
+            f'{config.machine.cutting_coefficient:g} N/m2, in its unit?'
+        )
     if described is None:
         return
+    fed = cut.feed_per_revolution or cut.feed_speed != Cut().feed_speed
+    if not fed and cut.bearing_contact is not BearingContact.NONE:
+        yield (
+            f'Where the workpiece seats is drawn for a feed of {cut.feed_speed * 1e3:g} mm/s, '
+            "the paper's: give --feed-per-revolution or `cut: {feed: ...}`."
+        )
+    low, high = limits.spindle_speed_rpm[[0, -1]]
     if _is_cut_known(config) and (doubt := described.speed_doubt(cut)):
         yield doubt
     ends = [described.speed_doubt(cut.with_changes(spindle_speed_rpm=end)) for end in (low, high)]

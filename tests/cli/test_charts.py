@@ -404,3 +404,26 @@ def test_the_csv_has_what_the_picture_shows(
     assert cli.main([*call, '--map']) == 2
     assert '--uncertain' in capsys.readouterr().err
     assert cli.main(['lobes', '--csv', str(tmp_path / 'm.csv'), *place[:2], '--map']) == 2
+
+
+@pytest.mark.parametrize(
+    ('coefficient', 'cut', 'said'),
+    [
+        ('1500', '{feed: 0.2 mm/rev}', ['No cut is as deep as the lowest limit, 1']),
+        ('1500 MPa', '{}', ['Where the workpiece seats is drawn for a feed of 2.5 mm/s']),
+        ('1500 MPa', '{feed: 0.2 mm/rev}', []),
+    ],
+)
+def test_what_a_machine_file_leads_one_to_doubt_is_said(
+    coefficient: str, cut: str, said: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mode = '{modes: [{frequency: 300 Hz, damping_ratio: 3 %, mass: 2 kg}]}'
+    (tmp_path / 'own.yaml').write_text(
+        f'tool: {mode}\nworkpiece: {mode}\nmaterial: {{cutting_coefficient: {coefficient}}}\n'
+        f'bearing: {{stiffness: 20 N/um, clearance: 5 um}}\ncut: {cut}\n'
+    )
+    words = ['lobes', '--machine', str(tmp_path / 'own.yaml'), '--from', '1000', '--to', '3000']
+    assert cli.main([*words, '--output', str(tmp_path / 'own.svg')]) == 0
+    warned = [line for line in capsys.readouterr().out.splitlines() if 'WARNING' in line]
+    assert len(warned) == len(said)
+    assert all(each in line for each, line in zip(said, warned, strict=True))
