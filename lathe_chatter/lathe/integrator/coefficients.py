@@ -313,14 +313,15 @@ def _fill_rules(
     state, forced = _whole_step(basis.generator, starts, held)
     rules[layout.STEP_SURFACE : layout.STEP_SURFACE + 12] = forced[:, :12].T
     rules[layout.STEP_TOOL_FORCE : layout.STEP_CUTTING_FORCE + 1] = forced[:, 12:].T
-    moved, power = inputs, basis.generator
-    for k in range(layout.SERIES_BEGIN, layout.SERIES_SIZE):
-        answers[:, : layout.OF_ITSELF, k] = moved
-        answers[:, layout.OF_ITSELF, k] = power[everyone, everyone]
-        answers[:, layout.OF_PARTNER, k] = power[everyone, pairs]
-        moved, power = product(basis.generator, moved), product(basis.generator, power)
-    moments = answers[:, layout.OF_SURFACE, layout.SERIES_BEGIN :][:, :MOMENTS]
-    rules[layout.STEP_MOMENT : layout.STEP_MOMENT + MOMENTS] = moments.T
+    terms = [np.hstack([inputs, basis.generator])]
+    for _ in range(TERMS - 1):
+        terms.append(product(basis.generator, terms[-1]))
+    known, itself = np.array(terms), inputs.shape[1] + everyone
+    following = answers[:, :, layout.SERIES_BEGIN :]
+    following[:, : layout.OF_ITSELF] = known[:, :, : layout.OF_ITSELF].transpose(1, 2, 0)
+    following[:, layout.OF_ITSELF] = known[:, everyone, itself].T
+    following[:, layout.OF_PARTNER] = known[:, everyone, itself[pairs]].T
+    rules[layout.STEP_MOMENT : layout.STEP_MOMENT + MOMENTS] = known[:MOMENTS, :, layout.SURFACE]
     rules[layout.STEP_OWN] = state[everyone, everyone]
     rules[layout.STEP_PARTNER] = state[everyone, pairs]
     matrices[0], matrices[1] = basis.generator, state
@@ -334,8 +335,9 @@ def _whole_step(generator: Array, starts: Array, held: Array) -> tuple[Array, Ar
     state, forced = starts.copy(), np.zeros(held.shape[:2])
     term, pushed = starts, np.zeros(held.shape[:2])
     for k in range(TERMS):
-        pushed = product(generator, pushed) + (held[:, :, k] if k < held.shape[2] else 0.0)
-        term, pushed = product(generator, term) / (k + 1), pushed / (k + 1)
+        moved = product(generator, np.hstack([term, pushed]))
+        pushed = moved[:, term.shape[1] :] + (held[:, :, k] if k < held.shape[2] else 0.0)
+        term, pushed = moved[:, : term.shape[1]] / (k + 1), pushed / (k + 1)
         state, forced = state + term, forced + pushed
     return state, forced
 
