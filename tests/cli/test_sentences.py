@@ -107,6 +107,9 @@ TOLD_ELSEWHERE = {
     'lowest depth that is safe with ': 'test_charts.py',
     'Without a spindle speed any line that holds the power is flagged': 'listening/',
     'uncertain there by: ': 'test_charts.py',
+    'No cut is as deep as the lowest limit': 'test_charts.py',
+    'Where the workpiece seats is drawn for a feed of ': 'test_charts.py',
+    'The chart has speeds at which the spindle': 'test_charts.py',
     'WARNING  ': 'tap_test, test_charts.py, test_identify.py',
     '  (scenario ': 'test_run.py',
 }
