@@ -10,6 +10,7 @@ import numpy as np
 
 from lathe_chatter.knocks import KnockMap, Margin
 from lathe_chatter.knocks.knock_map import Point
+from lathe_chatter.model import BearingContact
 from lathe_chatter.plot_style import (
     ALARM,
     NEUTRAL,
@@ -104,7 +105,7 @@ def _draw_curves(axes: Axes, knocks: KnockMap) -> None:
         name, factor, label, values = (
             'spindle_speed_rpm', 1.0, 'spindle speed / (rev/min)', of.speeds,
         )  # fmt: skip
-    elif len(of.depths) > 1:
+    elif len(of.depths) > 1 or of.config.cut.bearing_contact is BearingContact.NONE:
         name, factor, label, values = 'depth_of_cut', _MILLI, 'depth of cut / mm', of.depths
     points = [point for point in of.points() if point in knocks.limits]
     x = np.array([getattr(point, name) * factor for point in points])
@@ -120,13 +121,13 @@ def _draw_curves(axes: Axes, knocks: KnockMap) -> None:
     )
     for impulses, style, colour, said in (
         (np.abs(shown), 'o-', SEATED, 'smallest lasting knock'),
-        (linear, '-', OPEN, 'below: dies out for sure'),
+        (linear, '-' if x.size > 1 else 'v', OPEN, 'below: dies out for sure'),
         (tried, '^', SAFE, 'none lasts up to here'),
     ):
         if np.isfinite(impulses).any():
             axes.plot(x, impulses * scale.factor, style, color=colour, lw=1.2, ms=5, label=said)
     unstable = np.array([limit.margin is Margin.UNSTABLE for limit in limits])
-    half = 0.5 * np.diff(x).min() if x.size > 1 else 0.5
+    half = 0.5 * (np.diff(x).min() if x.size > 1 else float(np.abs(x).max(initial=0.0)) or 1.0)
     for k, place in enumerate(x[unstable].tolist()):
         axes.axvspan(
             place - half, place + half, color=ALARM, alpha=0.3, lw=0,

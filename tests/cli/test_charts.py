@@ -427,3 +427,15 @@ def test_what_a_machine_file_leads_one_to_doubt_is_said(
     warned = [line for line in capsys.readouterr().out.splitlines() if 'WARNING' in line]
     assert len(warned) == len(said)
     assert all(each in line for each, line in zip(said, warned, strict=True))
+
+
+def test_the_knock_of_one_cut_without_bearing_is_drawn_over_its_depth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = tmp_path / 'knock.jsonl'
+    words = ['--bearing-contact', 'none', '--depths', '0.3 mm', '--step', '2']
+    assert cli.main(['knock-map', *words, '--reach', '1', '--output', str(place)]) == 0
+    capsys.readouterr()
+    drawn = place.with_suffix('.svg').read_text(encoding='utf-8')
+    assert 'depth of cut / mm' in drawn
+    assert 'clearance / ' not in drawn
