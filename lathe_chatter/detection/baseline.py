@@ -53,6 +53,11 @@ _STEP_HOLD = 300
 """Hops until the baseline is that of the new cut."""
 SETTLING = 20
 """Hops after which something is known."""
+_EVEN, SLOWEST_FALL = 0.5, 0.02
+"""Part of the changes of energy that is one even fall, and its rate, 1/s, from which on vibration
+dies down: of a limit that is reached the energy varies to and fro, or not at all."""
+_FALLEN = 0.95
+"""Part of the mean power of a longer time, below which it has fallen whatever it swings by."""
 
 
 @compiled(borrows=True, inner=True)
@@ -177,6 +182,29 @@ def growth_by_energy(
     error = math.sqrt(0.5 * misfit / square) / size / period
     turn = ratio / pole
     return math.log(size) / period, error, math.atan2(turn.imag, turn.real) / period
+
+
+@compiled(borrows=True, inner=True)
+def dies_down(state: DetectorState, newest: int, length: int, settings: Any) -> bool:
+    """Whether the loudest resonator falls evenly, as vibration that is left to itself does."""
+    loudest, most = 0, -1.0
+    for j in range(state.motion.shape[1]):
+        sample = state.motion[newest, j]
+        energy = sample.real**2 + sample.imag**2
+        if energy > most:
+            loudest, most = j, energy
+    mean = square = trend = 0.0
+    for back in range(length):
+        sample = state.motion[(newest - back) % HOPS, loudest]
+        energy = sample.real**2 + sample.imag**2
+        mean += energy / length
+        square += energy**2 / length
+        trend += energy * (0.5 * (length - 1) - back) / length
+    if settings.has_machine == 0 and mean < _FALLEN * state.line[0, loudest]:
+        return True
+    fall = -trend / ((length**2 - 1.0) / 12.0)
+    even = -trend * fall > _EVEN * (square - mean**2)
+    return even and fall > 2.0 * SLOWEST_FALL * settings.period * mean
 
 
 @compiled(borrows=True, inner=True)

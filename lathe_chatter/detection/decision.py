@@ -20,6 +20,7 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.baseline import (
     ARMED,
     SETTLING,
+    dies_down,
     follow_breaks,
     follow_energy,
     follow_lines,
@@ -57,7 +58,7 @@ _ENERGY_ALONE = 3.2
 """The same of the energy ratio alone, without a model of the machine."""
 _GROWTH_SHARE = 0.1
 _MOST_GROWTH = 6.0
-_SMALLEST_GROWTH = 0.2
+SMALLEST_GROWTH = 0.2
 """Growth rate below which nothing is called chatter, 1/s."""
 _TRUSTED = 3
 """The window by which it is judged whether the signal stands out of the sensors' noise."""
@@ -173,7 +174,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
             cut_off = model and known.length < WINDOWS[number]
             if cut_off and number > 0 and known.length <= WINDOWS[number - 1]:
                 break  # after a jump: it knows no more than the one before
-            if known.growth > _SMALLEST_GROWTH:
+            if known.growth > SMALLEST_GROWTH:
                 limit = LIMITS[number] if model else _STRICTER * LIMITS[number]
                 if loud and number < _PATIENT:
                     limit = _LOUD_LIMITS[number - first]
@@ -378,6 +379,8 @@ def judge(
         steady = _saturated(state, products, newest, steadiest, stiff, length)
         # Roundings are steady too.
         steady = steady and amplitude > now.smallest_amplitude
+        # Free vibration that is hardly damped is as steady for a while.
+        steady = steady and not dies_down(state, newest, length, settings)
         now.saturated = now.saturated + 1 if steady else 0
     _decide(state, amplitude, recent, by_itself)
     write_figures(state, windows, wave, model, amplitude)

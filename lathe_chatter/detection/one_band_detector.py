@@ -80,6 +80,7 @@ class BandDetector:
 
     Attributes:
         hop: Samples in a hop.
+        period: Length of a hop, s.
         state: What is known, `now` above all.
         believed: Whether the machine is, if there is one: it is until it is seen to be wrong.
         fit: Of the machine.
@@ -111,13 +112,14 @@ class BandDetector:
             stride = max(1, round(pace * self._thinned / _LOOKS))
         outputs = max(1, round(pace * _HOP * self._thinned / stride))
         self.hop = thinning * stride * outputs
+        self.period = self.hop / form.rate
         self._kernels = design(machine, self._thinned, _DECAY / pace, band)
         self._mechanics = mechanics_of(machine or _PAPER, *band)
         self._slowest_turns = thresholds.slowest_turns
         self._settings = record(
             SETTINGS,
             rate=form.rate,
-            period=self.hop / form.rate,
+            period=self.period,
             gain=gain(self._kernels, self._thinned, band.middle) if self._full else 1.0,
             tool_stiffness=machine.tool.stiffness if machine is not None else 0.0,
             forced_amplitude=math.inf if form.mixed else thresholds.forced_amplitude,
@@ -155,7 +157,7 @@ class BandDetector:
         self.centres = np.angle(poles) * self._thinned / (2.0 * math.pi)
         self.line_weights = (1.0 - np.abs(poles)) ** 2
         times = np.clip(_LINE_TURNS / (2.0 * math.pi * self.centres), *_LINE_TIMES)
-        self.state.line_shares[:] = self.hop / form.rate / times
+        self.state.line_shares[:] = self.period / times
         width = _DECAY / pace / (2.0 * math.pi)
         spacing = float(self.centres[1] - self.centres[0])
         ratio = math.pi * width / spacing

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.detection.baseline import SLOWEST_FALL
 from lathe_chatter.detection.detector_state import HOPS
 from lathe_chatter.detection.one_band_detector import BandDetector
 
@@ -29,6 +30,10 @@ _PRESENT = 0.2
 """Part of its mean power that a line must have now: what has ended stands in the mean for long."""
 _LOOKS, _LOOKS_GONE = 3, 4
 """Looks in a row that must find it, and that must find none any more."""
+_EVEN = 0.9
+"""Part of the changes of its power that is one even fall, where it dies down: noise is uneven."""
+_FALLEN = 0.75
+"""Part of its mean power that the power of the last hops is at least, if it does not die down."""
 _NEWEST = 8
 """Hops whose power is looked at where a rise is enough."""
 _OTHER = 0.08
@@ -113,10 +118,23 @@ class SteadyToneAlarm:
             self._found, self._hertz = 0, hertz
         risen = now.score >= self._strictness
         present = abs(judge.state.motion[now.newest, place]) ** 2 > _PRESENT * mean
+        present = present and not _dies_down(judge, place)
         change = 1 if present and (steady or risen) else -1
         self._found = min(max(self._found + change, 0), _LOOKS)
         if self._found >= _LOOKS and not now.by_line:
             judge.raise_by_line()
+
+
+def _dies_down(judge: BandDetector, place: int) -> bool:
+    """Whether the power of a resonator falls as that of vibration that is left to itself."""
+    last = int(judge.state.now[0].newest) - np.arange(HOPS)
+    power = np.abs(judge.state.motion[last % HOPS, place]) ** 2
+    if power.mean() < _FALLEN * judge.state.line[0, place]:
+        return True
+    ago = np.arange(HOPS) - 0.5 * (HOPS - 1)
+    fall = ago @ power / (ago @ ago)
+    even = fall**2 * (ago @ ago) > _EVEN * HOPS * power.var()
+    return bool(even and fall > 2.0 * SLOWEST_FALL * judge.period * power.mean())
 
 
 def _with_neighbour(power: Array, place: int) -> float:

@@ -1,0 +1,47 @@
+"""Free vibration of a stable cut without noise is no chatter, however slowly it dies down."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from lathe_chatter.detection import ChatterDetector
+from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.model import Cut, Machine, Mode
+from lathe_chatter.stability import critical_depth, rightmost_root
+
+_TURN = 2.0 * math.pi
+_SHOP = Machine(
+    Mode(2.0, _TURN * 300.0, 0.03), Mode(20.0, _TURN * 120.0, 0.03), cutting_coefficient=1.5e9
+)
+_SMALL = Machine(
+    Mode(0.05, _TURN * 1000.0, 0.02), Mode(2.0, _TURN * 300.0, 0.03), cutting_coefficient=1.5e9
+)
+_CUTS = [
+    (_SHOP, 4000.0, 0.3e-3),
+    (_SHOP, 900.0, 0.0),
+    (_SMALL, 6000.0, 0.0),
+    (Machine(), 3000.0, 0.0),
+    (Machine(), 10000.0, 0.0),
+]
+
+
+@pytest.mark.parametrize('told', ['machine', 'nothing', 'no angle'])
+@pytest.mark.parametrize(('machine', 'rpm', 'depth'), _CUTS)
+def test_the_initial_motion_of_a_stable_cut_is_not_flagged(
+    machine: Machine, rpm: float, depth: float, told: str
+) -> None:
+    depth = depth or 0.95 * critical_depth(machine, rpm, seated=False)
+    assert -6.0 < rightmost_root(machine, rpm, depth, seated=False).real < 0.0
+    cut = Cut(
+        spindle_speed_rpm=rpm, depth_of_cut=depth, bearing_contact='none',
+        feed_per_revolution=2e-4, feed_speed=2e-4 * rpm / 60.0,
+    )  # fmt: skip
+    lathe = VirtualLathe(machine, cut=cut)
+    detector = ChatterDetector(machine if told == 'machine' else None)
+    skipped = 'spindle_angle' if told == 'no angle' else ''
+    kept = [name for name in lathe.columns if name != skipped]
+    places = [lathe.columns.index(name) for name in kept]
+    found = [detector.update(lathe.advance(200)[:, places], kept) for _ in range(300)]
+    assert not any(each.chatter for each in found)
