@@ -16,6 +16,7 @@ from lathe_chatter.detection.filter_design import (
     band_of,
     bands_of,
 )
+from lathe_chatter.detection.giving_bodies import identifiable
 from lathe_chatter.detection.one_band_detector import (
     ADVISED_LONG_AGO,
     TO_BE_ADVISED,
@@ -170,7 +171,7 @@ class ChatterDetector:
             if (request := self._estimate.request) is not None:
                 self._estimate = replace(self._estimate, request=request.within(speed_range))
         self._told = machine
-        self._machine = machine if _has_plain_modes(machine) else None
+        self._machine, self._lone, self._without = identifiable(machine)
         self._correction: tuple[float, float] | None = None
         if not first:
             self._begin_with_machine()
@@ -233,10 +234,14 @@ class ChatterDetector:
             alarmed = self._estimate.chatter
             self._estimate = Estimate(time, chatter=alarmed, mode=Mode.TOO_SLOW)
             return
-        size = len(hops.block) if self._lines is None else self._framer.hop
-        for begin in range(0, len(hops.block), size):
+        block = hops.block
+        if self._lone == 'workpiece' and self._mode is Mode.FULL:
+            # It moves with the force as a tool does against it.
+            block = block.take([0, 2, 1], axis=1) * [1.0, -1.0, -1.0]
+        size = len(block) if self._lines is None else self._framer.hop
+        for begin in range(0, len(block), size):
             for judge in self._judges:
-                judge.take(hops.block[begin : begin + size])
+                judge.take(block[begin : begin + size])
             if self._lines is not None:
                 self._lines.look()
         if len(self._judges) > 1:
@@ -256,26 +261,26 @@ class ChatterDetector:
         """Whether the machine that was told is believed; empty where it is."""
         if self._machine is None or self._told is None or self._mode is not Mode.FULL:
             return ''
-        hertz = self._told.tool.natural_frequency / _TURN
+        body = self._lone or 'tool'
+        hertz = getattr(self._told, body).natural_frequency / _TURN
+        told = f'the {body}, told at {hertz:.1f} Hz'
         if not judge.believed:
             found = f'{judge.fit.frequency:.1f} +- {judge.fit.error:.1f} Hz'
-            return (
-                f'the tool, told at {hertz:.1f} Hz, is heard at {found}: judged without a machine'
-            )
+            return f'{told}, is heard at {found}: judged without a machine'
         if self._correction is not None:
             found = '{:.1f} +- {:.1f} Hz'.format(*self._correction)
-            return f'the tool, told at {hertz:.1f} Hz, is taken at {found}, as it is heard'
+            return f'{told}, is taken at {found}, as it is heard'
         return ''
 
     def _new_estimate(self, time: float) -> Estimate:
         judge = self._judges[self._speaker]
         now = values_of(judge.state.now)  # a field of a record takes longer than all at once
         mode, words = self._mode, self._machine_in_words(judge)
-        if mode is Mode.NO_MACHINE and self._told is not None:
-            mode = Mode.MANY_MODES
+        if mode is Mode.NO_MACHINE:
+            mode = self._without
         if words:
             mode = Mode.CORRECTED if judge.believed else Mode.MISFIT
-        stiffness = now['stiffness']
+        stiffness = math.nan if self._lone else now['stiffness']
         engaged = None
         if self._machine is not None and math.isfinite(stiffness):
             bearing = self._machine.bearing_stiffness
@@ -301,15 +306,5 @@ class ChatterDetector:
             self._framer.faults(),
             words,
             *(judge.margin if mode.knows_machine and not now['alarmed'] else (math.nan, math.nan)),
-            self._correction[0] if self._correction is not None else math.nan,
+            self._correction[0] if self._correction and self._lone != 'workpiece' else math.nan,
         )
-
-
-def _has_plain_modes(machine: Machine | None) -> bool:
-    """Whether the machine, if there is one, has what the identification takes.
-
-    That is a mode each, which moves as the force acts.
-    """
-    modes = () if machine is None else (*machine.tool.modes, *machine.workpiece.modes)
-    plain = all(mode.chip == mode.force == mode.bearing == 1.0 for mode in modes)
-    return plain and len(modes) <= 2

@@ -29,6 +29,7 @@ class Mode(str, Enum):
     CORRECTED = 'both displacements, and the machine with its tool as it is heard'
     MISFIT = 'no machine, for the one that was told does not fit what is heard'
     MANY_MODES = 'no machine, for the one that was told has more than a plain mode each'
+    FAR_APART = 'no machine, for the bodies of the one that was told are far apart in frequency'
     ONE_SENSOR = 'the motion of one body only'
     MIXTURE = 'sound or force alone, which does not tell how fast a vibration grows'
     NO_MACHINE = 'the machine is not known'
@@ -84,10 +85,12 @@ class Estimate:
         growth_rate: Real part of the rightmost root of the identified cut, 1/s.
         growth_rate_error: Its standard error, 1/s.
         frequency: Of the chatter, or of the least damped vibration, Hz.
-        amplitude: Of the tool's vibration in the band that is not the spindle's own, m.
+        amplitude: Of the tool's vibration in the band that is not the spindle's own, m; of the
+            workpiece's where the tool was told not to give.
         spindle_speed_rpm: rev/min.
         cutting_stiffness: C w, N/m.
-        workpiece_stiffness: What carries the workpiece: k_wp, up to k_wp + k_bc, N/m.
+        workpiece_stiffness: What carries the workpiece: k_wp, up to k_wp + k_bc, N/m; nan where
+            only one body gives.
         bearing_engaged: Whether the workpiece rests on its bearing, at least in part.
         once_per_turn: Variance at one spindle angle from turn to turn, over all variance: near
             1 for chatter, near 0 for vibration that is the spindle's own.
