@@ -21,6 +21,7 @@ sys.path.append(str(Path(__file__).parents[2] / 'tests'))
 from support.machines import random_machine
 
 SLOW, FAST = 1000.0, 12000.0
+_WAVES = range(1, 9)
 _SCAN = 60.0 / np.linspace(60.0 / SLOW, 60.0 / FAST, 300)
 
 
@@ -84,16 +85,24 @@ def judge(trial: Trial) -> Outcome:
     return Outcome(flagged, bool(growth.min() < 0.0), bool(stable), advised)
 
 
-def _rule_figures(trials: list[Trial]) -> str:
-    """How often the first speed of the rule of thumb is stable, the frequency known exactly."""
+def _rule_figures(trials: list[Trial]) -> list[str]:
+    """How often a speed of the rule of thumb is stable, the frequency known exactly."""
     held, tried = 0, 0
+    by_waves = dict.fromkeys(_WAVES, 0)
     for machine, rpm, depth, seated, _ in trials:
         frequency = rightmost_root(machine, rpm, depth, seated=seated).imag / (2.0 * np.pi)
         for speed in rule_of_thumb(frequency, (SLOW, FAST)).speeds[:1]:
             tried += 1
             root = rightmost_root(machine, speed.spindle_speed_rpm, depth, seated=seated)
             held += root.real < 0.0
-    return f'60 f/k, random machines: stable in {held} of {tried} = {100.0 * held / tried:.0f} %'
+        for waves in _WAVES:
+            root = rightmost_root(machine, 60.0 * frequency / waves, depth, seated=seated)
+            by_waves[waves] += root.real < 0.0
+    shares = ', '.join(f'{k}: {100.0 * n / len(trials):.0f} %' for k, n in by_waves.items())
+    return [
+        f'60 f/k, random machines: stable in {held} of {tried} = {100.0 * held / tried:.0f} %',
+        f'60 f/k by k, the spindle as fast as need be: {shares}',
+    ]
 
 
 def advice_figures(random: int, executor: Executor) -> list[str]:
@@ -115,4 +124,4 @@ def advice_figures(random: int, executor: Executor) -> list[str]:
             f'{len(possible)}, recommended one is stable for {held} = {share:.1f} % '
             f'({wrong} unstable, {len(possible) - held - wrong} none found)'
         )
-    return [*lines, _rule_figures(trials[8:])]
+    return [*lines, *_rule_figures(trials[8:])]

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.detection.decision import SMALLEST_GROWTH
 from lathe_chatter.detection.detector_state import UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filter_design import (
@@ -36,6 +38,8 @@ _NYQUIST = 0.5
 _LOOK = 0.05
 """s from one look for a line above all others to the next."""
 _TURN = 2.0 * math.pi
+_SURE_SIGN = 2.0
+"""Standard errors from which on growth that is read from the vibration has a sign."""
 
 
 class ChatterDetector:
@@ -287,6 +291,8 @@ class ChatterDetector:
             engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
         if self._mixed:  # neither metres nor a growth rate that is one body's
             now |= dict.fromkeys(('growth', 'growth_error', 'shown_amplitude'), math.nan)
+        elif not judge.believed and not _sign_is_known(now):
+            now['growth'] = math.nan
         return Estimate(
             time,
             STATES[now['state']],
@@ -308,3 +314,14 @@ class ChatterDetector:
             *(judge.margin if mode.knows_machine and not now['alarmed'] else (math.nan, math.nan)),
             self._correction[0] if self._correction and self._lone != 'workpiece' else math.nan,
         )
+
+
+def _sign_is_known(now: dict[str, Any]) -> bool:
+    """Whether the growth of the vibration alone tells whether the cut is stable.
+
+    Chatter that has grown as far as it can swells and fades, and neither says that it does not
+    grow from small.
+    """
+    growth = now['growth']
+    sure = abs(growth) > _SURE_SIGN * now['growth_error']
+    return bool(sure and (growth > SMALLEST_GROWTH or not now['alarmed']))

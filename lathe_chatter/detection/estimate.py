@@ -82,7 +82,8 @@ class Estimate:
             (too little data, a ramp, a gap).
         chatter: The alarm; it stays until the chatter has died out.
         mode: With how much the detector has to work.
-        growth_rate: Real part of the rightmost root of the identified cut, 1/s.
+        growth_rate: Real part of the rightmost root of the identified cut, 1/s; without a machine
+            that of the vibration itself, where this tells whether the cut is stable.
         growth_rate_error: Its standard error, 1/s.
         frequency: Of the chatter, or of the least damped vibration, Hz.
         amplitude: Of the tool's vibration in the band that is not the spindle's own, m; of the

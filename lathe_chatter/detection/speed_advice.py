@@ -31,8 +31,8 @@ _AROUND, _TRIED = 0.15, 61
 """Part of a speed by which others around it are tried, and how many are."""
 _WIDE, _AS_GOOD = 0.04, 0.8
 """Width that an ordinary spindle can keep to; part of the damping that the middle must have."""
-_RULE_LEAST, _RULE_MOST = 1, 3
-"""Waves a turn that the rule of thumb tries: of more, fewer than half were stable."""
+_RULE_MOST = 3
+"""Waves a turn up to which the rule of thumb is tried: of more, fewer were stable than it says."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,8 @@ class Advice:
         words = self.in_words(depth)
         if self.differs_from(earlier) or not words:
             return words
+        if not self.speeds and not math.isfinite(self.depth_factor):
+            return ''
         moved = abs(self.found_at_rpm / earlier.found_at_rpm - 1.0) > ANOTHER_SPEED
         return f'the advice stands: {words}' if moved else ''
 
@@ -89,7 +91,9 @@ class Advice:
         """Whether it says something, and another thing than the earlier one."""
         if not self.speeds:
             known = math.isfinite(self.depth_factor)
-            return known and (bool(earlier.speeds) or not math.isfinite(earlier.depth_factor))
+            if not known:
+                return bool(self.in_words() and not earlier.in_words())
+            return bool(earlier.speeds) or not math.isfinite(earlier.depth_factor)
         if not earlier.speeds:
             return True
         ratio = self.speeds[0].spindle_speed_rpm / earlier.speeds[0].spindle_speed_rpm
@@ -117,7 +121,7 @@ class Advice:
                 expected = f' (a rule of thumb without a machine, {chance})'
             return f'try {best.spindle_speed_rpm:.0f} rev/min{expected}'
         if not math.isfinite(self.depth_factor):
-            return ''
+            return 'no stable speed is known' if math.isfinite(self.found_at_rpm) else ''
         reduced = f'{100.0 * self.depth_factor:.0f} %'
         if depth is not None:
             reduced = f'{1e3 * depth * self.depth_factor:.3f} mm'
@@ -290,10 +294,10 @@ def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:
     Args:
         frequency: Of the chatter, Hz.
         speed_range: Lowest and highest speed allowed, rev/min.
+
+    Returns:
+        No speed where the spindle is too slow for so few vibrations a turn.
     """
-    if not frequency > 0.0:
-        return Advice()
-    fewest = max(_RULE_LEAST, math.ceil(60.0 * frequency / speed_range[1]))
-    speeds = [60.0 * frequency / waves for waves in range(fewest, fewest + _RULE_MOST)]
-    inside = [speed for speed in speeds if speed >= speed_range[0]]
+    speeds = [60.0 * frequency / waves for waves in range(1, _RULE_MOST + 1)]
+    inside = [speed for speed in speeds if speed_range[0] <= speed <= speed_range[1]]
     return Advice(tuple(AdvisedSpeed(speed, probability=_RULE_HOLDS) for speed in inside))

@@ -16,6 +16,8 @@ SPEEDS = (60.0, 30_000.0)
 _ADVISED_AT = (0, 2, 4, 7, 10, 15, 20, 30)
 """Hops after the alarm, and after a change of speed that was no cure, at which a speed is
 recommended, each time from a better estimate."""
+_WITHIN_REACH = 2.0
+"""Times the present speed, that a spindle is taken to reach of which nothing else is known."""
 _CLEAR_CONTACT = 0.15
 """Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
 _VAGUE = 10.0
@@ -86,7 +88,10 @@ class AdviceRequest:
         """What to do, some 10 ms after it is asked for first."""
         known = self.known
         if self.machine is None:
-            found = rule_of_thumb(known.frequency, self.speed_range)
+            slowest, fastest = self.speed_range
+            if fastest >= SPEEDS[1]:  # nobody has said what the spindle can
+                fastest = min(_WITHIN_REACH * known.spindle_speed_rpm, fastest)  # may be nan
+            found = rule_of_thumb(known.frequency, (slowest, fastest))
         else:
             found = advise(
                 self.machine,

@@ -77,6 +77,8 @@ def test_chatter_of_the_slower_of_two_bodies_far_apart_is_flagged_without_a_mach
     assert all(each.chatter and each.mode is WorksWith.FAR_APART for each in found[flag:])
     hertz = np.median([each.frequency for each in found[flag:]])
     assert hertz == pytest.approx(root.imag / _TURN, rel=0.005)
+    # Full grown it grows no more, and nobody can tell from it how it would grow from small.
+    assert not any(each.growth_rate < 0.0 for each in found[flag:])
 
 
 def test_a_lone_body_told_wrong_is_named() -> None:

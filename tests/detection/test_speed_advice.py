@@ -69,6 +69,8 @@ def test_the_rule_of_thumb_puts_whole_waves_on_a_turn() -> None:
     speeds = [speed.spindle_speed_rpm for speed in rule_of_thumb(130.0, _RANGE).speeds]
     assert speeds == pytest.approx([7800.0, 3900.0, 2600.0])
     assert rule_of_thumb(130.0, (3000.0, 7000.0)).speeds[0].spindle_speed_rpm == 3900.0
+    # Of more than three waves a turn fewer are stable than is said.
+    assert rule_of_thumb(130.0, (60.0, 2500.0)).speeds == ()
     # As text: of two nan no two Pythons think alike.
     assert repr(rule_of_thumb(float('nan'), _RANGE)) == repr(Advice())
 
@@ -79,5 +81,11 @@ def test_advice_is_news_where_it_says_another_thing() -> None:
     for told, now in [(nothing, slower), (nothing, less), (slower, faster), (less, slower)]:
         assert now.differs_from(told)
         assert told is nothing or told.differs_from(now)
+    unknown = Advice(found_at_rpm=900.0)
+    assert unknown.in_words() == 'no stable speed is known'
+    assert unknown.after(nothing) == unknown.in_words()
+    assert slower.differs_from(unknown)
+    assert not unknown.after(unknown)
+    assert not unknown.after(slower)
     for told, now in [(nothing, nothing), (less, less), (slower, same), (slower, nothing)]:
         assert not now.differs_from(told)

@@ -9,6 +9,7 @@ import pytest
 from support.machines import random_machine
 
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
+from lathe_chatter.detection.speed_adviser import SPEEDS, AdviceRequest, Identified
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
@@ -153,3 +154,23 @@ def test_a_range_of_speeds_that_is_told_amid_chatter_holds_at_once() -> None:
     speeds = [estimate.recommended_speed_rpm for estimate in seen]
     assert any(speed > 0.0 for speed in speeds)
     assert not any(speed > 3000.0 for speed in speeds)
+
+
+@pytest.mark.parametrize(
+    ('hertz', 'rpm', 'speeds', 'words'),
+    [
+        (326.0, 900.0, SPEEDS, 'no stable speed is known'),
+        (326.0, 900.0, (60.0, 3000.0), 'no stable speed is known'),
+        (326.0, 900.0, (60.0, 12000.0), 'try 9780 rev/min'),
+        (326.0, 10000.0, SPEEDS, 'try 19560 rev/min'),
+        (130.0, 3000.0, SPEEDS, 'try 3900 rev/min'),
+        (130.0, math.nan, SPEEDS, ''),
+    ],
+)
+def test_the_rule_of_thumb_stays_in_reach_of_a_spindle_of_which_nothing_is_known(
+    hertz: float, rpm: float, speeds: tuple[float, float], words: str
+) -> None:
+    known = Identified(4.0, 0.1, hertz, rpm, math.nan, math.nan)
+    said = AdviceRequest(known, None, speeds).answer.in_words()
+    assert said.startswith(words)
+    assert bool(said) is bool(words)

@@ -42,7 +42,7 @@ def scenario(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_machine_without_a_spindle_is_advised_no_speed_beyond_the_usual(tmp_path: Path) -> None:
+def test_a_machine_without_a_spindle_is_advised_no_speed_out_of_reach(tmp_path: Path) -> None:
     """A body of several modes is not identified: 60 f/k is all there is, of some 1000 Hz."""
     modes = '{frequency: 1000 Hz, damping_ratio: 3 %, mass: 2 kg}'
     modes += ', {frequency: 2500 Hz, damping_ratio: 3 %, mass: 2 kg}'
@@ -59,9 +59,8 @@ def test_a_machine_without_a_spindle_is_advised_no_speed_beyond_the_usual(tmp_pa
     told: list[str] = []
     done = simulate(load_scenario(file), tmp_path / 'run', tell=lambda _t, what: told.append(what))
     assert done.flagged
-    speeds = [float(what.split()[2]) for what in told if what.startswith('advice: try')]
-    assert speeds
-    assert all(60.0 <= speed <= 30_000.0 for speed in speeds), told
+    assert 'advice: no stable speed is known' in told
+    assert not any(what.startswith('advice: try') for what in told)
 
 
 def test_chatter_is_flagged_and_cured_within_the_range_of_the_spindle(
