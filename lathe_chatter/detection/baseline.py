@@ -185,8 +185,11 @@ def growth_by_energy(
 
 
 @compiled(borrows=True, inner=True)
-def dies_down(state: DetectorState, newest: int, length: int, settings: Any) -> bool:
-    """Whether the loudest resonator falls evenly, as vibration that is left to itself does."""
+def dies_down(state: DetectorState, newest: int, length: int, settings: Any, stable: bool) -> bool:
+    """Whether the loudest resonator falls evenly, as vibration that is left to itself does.
+
+    Or falls at all, where the cut is known to be stable.
+    """
     loudest, most = 0, -1.0
     for j in range(state.motion.shape[1]):
         sample = state.motion[newest, j]
@@ -203,7 +206,7 @@ def dies_down(state: DetectorState, newest: int, length: int, settings: Any) -> 
     if settings.has_machine == 0 and mean < _FALLEN * state.line[0, loudest]:
         return True
     fall = -trend / ((length**2 - 1.0) / 12.0)
-    even = -trend * fall > _EVEN * (square - mean**2)
+    even = stable or -trend * fall > _EVEN * (square - mean**2)
     return even and fall > 2.0 * SLOWEST_FALL * settings.period * mean
 
 

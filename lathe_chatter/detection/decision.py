@@ -379,8 +379,11 @@ def judge(
         steady = _saturated(state, products, newest, steadiest, stiff, length)
         # Roundings are steady too.
         steady = steady and amplitude > now.smallest_amplitude
-        # Free vibration that is hardly damped is as steady for a while.
-        steady = steady and not dies_down(state, newest, length, settings)
+        # Free vibration that is hardly damped is as steady for a while. Where it beats as well,
+        # the machine knows that it dies down, if the tool has not left the cut.
+        sure = model and now.since_break > HOPS
+        sure = sure and _surely_stable(identified, _TRUSTED, WINDOWS.size)
+        steady = steady and not dies_down(state, newest, length, settings, sure)
         now.saturated = now.saturated + 1 if steady else 0
     _decide(state, amplitude, recent, by_itself)
     write_figures(state, windows, wave, model, amplitude)
