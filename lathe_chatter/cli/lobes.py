@@ -31,7 +31,7 @@ from lathe_chatter.cli.parameter_options import (
 from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.errors import ParameterError, UnprovenError
 from lathe_chatter.lathe.config import LatheConfig
-from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantity_fields import Quantity, limits_of
 from lathe_chatter.model.uncertainty import Uncertainty, uncertainty_from
 from lathe_chatter.plot_style import files_of_picture
@@ -188,8 +188,9 @@ def _doubts(config: LatheConfig, limits: SafeLimit) -> Iterator[str]:
         )
     if described is None:
         return
+    own = described.machine.workpiece != Machine().workpiece
     fed = cut.feed_per_revolution or cut.feed_speed != Cut().feed_speed
-    if not fed and cut.bearing_contact is not BearingContact.NONE:
+    if own and not fed and cut.bearing_contact is not BearingContact.NONE:
         yield (
             f'Where the workpiece seats is drawn for a feed of {cut.feed_speed * 1e3:g} mm/s, '
             "the paper's: give --feed-per-revolution or `cut: {feed: ...}`."
