@@ -57,7 +57,7 @@ _SPEED = limits_of(Cut, 'spindle_speed_rpm')
 _DEPTH = Quantity(
     'top of the chart', 'm', high=limits_of(Cut, 'depth_of_cut').high, exclusive=True
 )
-_PROBABLE_MACHINES = 1000
+_PROBABLE_MACHINES = 600
 _MAP = (222, 76)
 _VARIED_MAP = (56, 20)
 """Speeds and depths of a map; each point of a varying speed is an eigenproblem of its own."""
