@@ -38,8 +38,8 @@ from lathe_chatter.plot_style import files_of_picture
 from lathe_chatter.report.probability_chart import (
     SURE,
     cut_probability,
+    interpolation_speeds,
     probability_sentence,
-    telling_speeds,
 )
 from lathe_chatter.report.stability_chart import (
     chart_limits,
@@ -296,7 +296,7 @@ def _probability(
             config.machine,
             known,
             config.cut,
-            telling_speeds(limits),
+            interpolation_speeds(limits),
             machines=_PROBABLE_MACHINES,
             tool_leaves_cut=config.setup.tool_leaves_cut,
             executor=wide.executor,

@@ -11,7 +11,7 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import LATHE, cut_from, described_by, machine_from
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.page.versioned_values import finite
-from lathe_chatter.report.probability_chart import telling_speeds
+from lathe_chatter.report.probability_chart import interpolation_speeds
 from lathe_chatter.report.stability_chart import (
     chart_limits,
     chart_speeds,
@@ -92,7 +92,7 @@ def draw_chart(
     found['contact'] = cut.bearing_contact.value
     found['top'] = top_of_chart(cut, limits)
     if described is not None and described.uncertainty:
-        speeds = telling_speeds(limits)
+        speeds = interpolation_speeds(limits)
         probable = stability_probability(
             machine, described.uncertainty, cut, speeds,
             machines=_MACHINES, tool_leaves_cut=tool_leaves_cut,

@@ -13,10 +13,7 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.plot_style import ALARM
-from lathe_chatter.report.probability_chart import (
-    draw_probability,
-    telling_speeds,
-)
+from lathe_chatter.report.probability_chart import draw_probability, interpolation_speeds
 from lathe_chatter.report.run_history import History
 from lathe_chatter.report.stability_chart import (
     bearing_text,
@@ -144,7 +141,7 @@ def draw_path(axes: Axes, history: History, chart: ChartOf) -> None:
     lowest = float(limits.open_limit.min())
     deepest = max(stay.cut.depth_of_cut for stay in stays)
     top = max(1.4 * deepest, 1.6 * lowest if math.isfinite(lowest) else 0.0, 1e-6)
-    probability = _probability(chart, telling_speeds(limits))
+    probability = _probability(chart, interpolation_speeds(limits))
     draw_limits(axes, limits, chart.cut.bearing_contact, top, shade=probability is None)
     if probability is not None:
         draw_probability(axes, probability, top)

@@ -19,6 +19,8 @@ SURE = 0.95
 """The probability at which a depth is called safe."""
 _ABOVE, _BELOW = 0.01, 0.03
 """By how much a line between two speeds may leave the limit to either side, relative."""
+_COMPARED = 1e-9, 1e6
+"""Limits that are told apart, m."""
 _NARROW, _WIDE = 1 / 300, 1 / 150
 """Of the width of a chart: lobes within the one need not be told apart; no gap is wider than the
 other."""
@@ -65,7 +67,7 @@ def probability_sentence(cut: Cut, probability: StabilityProbability) -> str:
     return said
 
 
-def telling_speeds(limits: SafeLimit) -> Array:
+def interpolation_speeds(limits: SafeLimit) -> Array:
     """Speeds between which the limit is a straight line, or lies above it in narrow lobes.
 
     What is computed at these and drawn along lines is nowhere deeper than what is stable.
@@ -77,7 +79,8 @@ def telling_speeds(limits: SafeLimit) -> Array:
         Some of these speeds, with the first and the last, rev/min.
     """
     speeds = limits.spindle_speed_rpm
-    depths = np.minimum(limits.depth_of_cut, 100.0 * limits.depth_of_cut.min())
+    depths = np.clip(limits.depth_of_cut, *_COMPARED)  # it may be 0 throughout, or infinite
+    depths = np.minimum(depths, 100.0 * depths.min())
     narrow, wide = (share * (speeds[-1] - speeds[0]) for share in (_NARROW, _WIDE))
 
     def leaves(begin: int, end: int) -> Array:
