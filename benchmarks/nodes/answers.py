@@ -35,7 +35,9 @@ def _measure(
     with running(LATHE, *arguments) as lathe, ear(by_events=True) as listener:
         ask = _asker(listener)
         with script('flood.py', *map(str, flood)) if flood else contextlib.nullcontext():
-            listener.spin(limit=2.0 if flood else 0.5)
+            if flood:  # once it is there: a process that starts takes a core for itself
+                listener.spin(lambda: listener.node.count_publishers('/lathe/knock') > 0, limit=60.0)
+            listener.spin(limit=2.0)
             waits: list[float] = []
             until = time.monotonic() + seconds
             while time.monotonic() < until:

@@ -46,9 +46,9 @@ from lathe_chatter.nodes.simulation_control import Answer, RunControl, RunState
 from lathe_chatter.precompile import LATHE_LOOP, precompile
 
 _BUDGET = 5_000_000
-"""ns of ticks, or of waiting for readers, after which requests have their turn."""
-_READERS_PATIENCE = 100_000_000
-"""ns that a node as fast as possible waits for its slowest reader; in real time for nobody."""
+"""ns of ticks after which requests have their turn."""
+_PATIENCE = 0.1
+"""s that a node as fast as possible waits for a reader that is far behind; else for none such."""
 _MAX_KNOCKS = 1000
 """Knocks between two ticks; they come one after the other, and are applied together."""
 _LOOK_FOR_READERS = 5_000_000
@@ -104,7 +104,6 @@ class LatheNode(ParameterNode):
         tick = SECOND / values['tick_rate']
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
-        self._wait_until = 0
         self._others = PublisherWatch(self, self._log)
         self._clock_watch = ClockWatch(self, self._log, follows=self._follows, drives=drives)
         self._meter = TickStatistics(self._pacer, tick, self.requests)
@@ -166,6 +165,9 @@ class LatheNode(ParameterNode):
             self.pause(pause=False)
         if self._control.state is not RunState.RUNNING:
             return
+        faster = self._free or self._pacer.factor > 1.0  # in real time it waits for nobody
+        if faster and not self._topics.readers_follow(_PATIENCE if self._free else 0.0):
+            return
         now = self._now()
         if self._follows and now == 0:
             return  # no /clock yet
@@ -199,11 +201,8 @@ class LatheNode(ParameterNode):
 
     def _cut_freely(self, now: int) -> None:
         """Cut as fast as it goes, and as the readers can take it."""
-        if now < self._wait_until and not self._topics.wait_for_readers(_BUDGET / SECOND):
-            return
         while self._now() - now < _BUDGET and self._control.state is RunState.RUNNING:
             self._tick()
-        self._wait_until = self._now() + _READERS_PATIENCE
 
     def _follow(self, now: int) -> None:
         """See that /clock goes on as a clock does; else say so, and go on from where it is."""

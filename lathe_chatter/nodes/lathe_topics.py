@@ -31,6 +31,18 @@ _HISTORY = 4.0
 """Seconds, by the clock on the wall, that a reader may fall behind before it misses a tick."""
 MAX_HISTORY = 10_000
 """Ticks that are kept at most, where they come faster than in real time."""
+_ON_THE_WAY = 160_000
+"""Bytes of samples that a lathe faster than real time has on the way to its readers at most: more
+than the middleware's shared memory holds (0.5 MB in Fast DDS) are lost, and sent again and again.
+"""
+_SMALL = 1600
+"""Bytes as which a smaller message counts: of those, too, only so many find room."""
+_FAR_BEHIND = MAX_HISTORY // 4
+"""Ticks after which a reader may soon lose some, or is stuck."""
+_WAIT = Duration(nanoseconds=5_000_000)
+"""For the readers in one go: then requests have their turn."""
+_HICCUP = 0.01
+"""s after which a reader that is not far behind has missed a message: the next tells it so."""
 _TIME = SAMPLE_COLUMNS.index('time')
 _SAME = 1000
 """ns by which the roundings of two times differ at most."""
@@ -90,7 +102,9 @@ class LatheTopics:
         self.zero: int | None = None
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
-        self._look_at = 0.0
+        self._look_at = self._published_at = 0.0
+        self._unread = 0  # ticks since every reader was known to have all of them
+        self._size = 0  # bytes of the last
         self._heard_scalars: list[tuple[Publisher, int]] = []
         self._heard_joints = self._timed = False
 
@@ -101,8 +115,10 @@ class LatheTopics:
             samples: (n, columns), n > 0.
             stamp_of_last: Asked for its simulated time, ns, where somebody wants it.
         """
-        self._publish_samples(encode_block(samples, self._columns))
-        now = time.monotonic()
+        block = encode_block(samples, self._columns)
+        self._publish_samples(block)
+        self._published_at = now = time.monotonic()
+        self._unread, self._size = self._unread + 1, len(block)
         if now >= self._look_at:
             self._look_at = now + _LOOK_AROUND
             self._look_around()
@@ -136,9 +152,19 @@ class LatheTopics:
         """How many readers of the samples the publisher has met: they miss none from now on."""
         return int(self._samples.get_subscription_count())
 
-    def wait_for_readers(self, patience: float) -> bool:
-        """Wait until every reader has the samples, `patience` s at most; whether they have."""
-        return bool(self._samples.wait_for_all_acked(Duration(seconds=patience)))
+    def readers_follow(self, patience: float) -> bool:
+        """Whether the readers can take more; waits a while for the slowest.
+
+        Args:
+            patience: s without a tick after which the lathe goes on although one is far behind.
+        """
+        if self._unread * max(self._size, _SMALL) <= _ON_THE_WAY:
+            return True
+        if self._samples.wait_for_all_acked(_WAIT):
+            self._unread = 0
+            return True
+        waits = patience if self._unread > _FAR_BEHIND else _HICCUP
+        return time.monotonic() - self._published_at > waits
 
     def publish_clock(self, stamp: int) -> None:
         """Publish simulated time, ns, if this node drives the clock."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +14,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from std_msgs.msg import Float64MultiArray, String
 from support.node_bench import LATCHED, Bench
 from support.node_processes import NodeProcesses, Reports, Samples, contiguous
+
+from lathe_chatter.nodes.lathe_topics import MAX_HISTORY
 
 TICK = 0.002
 KEPT = 2000
@@ -75,6 +78,21 @@ def test_a_process_that_is_stopped_slows_nothing_and_says_what_it_missed(
     assert 0 < lost < 1e4 * samples.ends[-1]
     bench.spin_until(lambda: states[-1].data != 'unknown', 'a known state again')
     assert len(states) >= known
+
+
+def test_a_lathe_that_is_faster_than_its_readers_slows_down_and_loses_nothing(
+    bench: Bench, nodes: NodeProcesses, tmp_path: Path
+) -> None:
+    reports = Reports(bench)
+    nodes.start('chatter_monitor')
+    nodes.start('run_recorder', f'output:={tmp_path / "run"}')
+    nodes.start('lathe', 'real_time_factor:=100.0', 'await_readers:=2')
+    many = 10 * MAX_HISTORY
+    bench.spin_until(lambda: int(reports.value(PACE, 'ticks') or 0) > many, 'many ticks')
+    since = reports.count()
+    bench.spin_until(lambda: reports.value(HEARD, 'samples lost', since), 'the count')
+    assert reports.value(HEARD, 'samples lost', since) == '0'
+    assert float(reports.value(PACE, 'lag given up, s')) > 0.0
 
 
 def follow(
