@@ -36,7 +36,9 @@ def _measure(
         ask = _asker(listener)
         with script('flood.py', *map(str, flood)) if flood else contextlib.nullcontext():
             if flood:  # once it is there: a process that starts takes a core for itself
-                listener.spin(lambda: listener.node.count_publishers('/lathe/knock') > 0, limit=60.0)
+                listener.spin(
+                    lambda: listener.node.count_publishers('/lathe/knock') > 0, limit=60.0
+                )
             listener.spin(limit=2.0)
             waits: list[float] = []
             until = time.monotonic() + seconds
