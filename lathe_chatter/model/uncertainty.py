@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import ndtri
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
@@ -123,6 +122,8 @@ class Uncertainty:
             The machines, and the deviations of the logarithms that made them (count, n).
         """
         rng = np.random.default_rng(seed)
+        from scipy.special import ndtri  # a quarter of a second to load, and only wanted here
+
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         ranks = rng.permuted(np.tile(np.arange(count), (len(self.names), 1)), axis=1).T
