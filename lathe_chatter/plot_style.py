@@ -117,7 +117,9 @@ def save(figure: Figure, path: Path) -> None:
     from matplotlib import rc_context
 
     # The layout serves both files: to work it out takes as long as to draw one.
-    figure.draw_without_rendering()
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
     figure.set_layout_engine('none')
     # Neither file tells when or with what it was made: the same picture is the same bytes.
     with rc_context({'svg.fonttype': 'none', 'svg.hashsalt': ascii(path.stem)}):
