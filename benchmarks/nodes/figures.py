@@ -21,6 +21,7 @@ from processes import (
     cpu_shares,
     resident,
     running,
+    script,
 )
 from rcl_interfaces.msg import Log, ParameterEvent
 from rcl_interfaces.srv import SetParameters
@@ -30,13 +31,25 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from lathe_chatter.lathe.change_and_knock_sentences import parse_change
 
 TICK = 0.002
+_STARTED = 3.0
+"""s in which processes have found each other."""
 _IN_TIME = 0.01
 """Part of the ticks that are no later than their time."""
 KEPT = QoSProfile(depth=5000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def measure_cpu(seconds: float) -> None:
-    """CPU of the lathe alone, and with monitor and recorder."""
+    """CPU of the nodes, beside the least that takes such messages from one to two others."""
+    with contextlib.ExitStack() as stack:
+        pids = {'publisher': stack.enter_context(script('bare.py', 'publish'))}
+        pids['reader'] = stack.enter_context(script('bare.py', 'read'))
+        pids['another'] = stack.enter_context(script('bare.py', 'read'))
+        wait_for_node('/bare_publish')
+        time.sleep(_STARTED)
+        shares = cpu_shares(pids, seconds)
+        for name, share in shares.items():
+            print(f'{"bare " + name + ", all three running":37} {share:5.1f} % of a core')
+        print(f'{"bare, all three":37} {sum(shares.values()):5.1f} % of a core')
     with running(LATHE) as lathe:
         wait_for_node('/lathe')
         print(
