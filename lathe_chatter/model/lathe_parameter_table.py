@@ -111,6 +111,13 @@ def feed_refusal(given: Mapping[str, Any], present: Mapping[str, Any]) -> str:
     )
 
 
+def pace_refusal(given: Mapping[str, Any], present: Mapping[str, Any]) -> str:
+    """Why a lathe that follows /clock takes no other pace, or nothing; as `feed_refusal`."""
+    if given.get('real_time_factor') in {None, present['real_time_factor']}:
+        return ''
+    return 'real_time_factor has no effect under use_sim_time: the pace is that of /clock.'
+
+
 class HasParameters(Protocol):
     """A lathe, or how one is started."""
 
@@ -202,8 +209,7 @@ def _derived_lathe(given: Values) -> Resolved:
     if not given.get(MACHINE_FILE.name):
         return derived_machine(given)
     found = parameters_of(_Described(setup, cut_from(given)))
-    names = [*(row.name for row in CUT_ROWS), 'spindle_acceleration', 'sample_rate']
-    return {**derived_machine(given), **{name: found[name] for name in names}}
+    return {**derived_machine(given), **{name: found[name] for name in OF_A_MACHINE_FILE}}
 
 
 def _made_like(
@@ -248,6 +254,8 @@ MACHINE_FILE = Row(
 """For machines that take more than one mode to tell, and for all others."""
 CUT_ROWS = tuple(rows_of(Cut(), run_time=True))
 """Of the cut: what may change at run time."""
+OF_A_MACHINE_FILE = (*(row.name for row in CUT_ROWS), 'spindle_acceleration', 'sample_rate')
+"""Parameters besides those of the machine that a machine file may decide."""
 MACHINE_ROWS = tuple(rows_of(Machine()))
 """Of the machine: a monitor has them too."""
 SETUP_ROWS = (

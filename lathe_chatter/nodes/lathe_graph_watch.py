@@ -28,14 +28,20 @@ class ClockWatch:
     def __init__(self, node: Node, log: BoundedLog, *, follows: bool, drives: bool) -> None:
         """Nothing is seen yet."""
         self._node, self._log, self._follows, self._drives = node, log, follows, drives
-        self._stands = False
-        self._shown, self._since = 0, 0.0
+        self._stands = self._told = False
+        self._shown, self._since = 0, time.monotonic()
 
     def look(self, now: int) -> None:
         """Look at the time that it shows, ns; called once a second."""
         at, before = time.monotonic(), self._stands
         if now != self._shown:
             self._shown, self._since = now, at
+        if not (now or self._told) and at - self._since >= _CLOCK_STOPPED:
+            self._told = True
+            self._log.warning(
+                'use_sim_time is set, and /clock has shown no time yet: nothing is cut before.',
+                'clock awaited',
+            )
         self._stands = bool(now) and at - self._since >= _CLOCK_STOPPED
         if self._stands and not before:
             self._log.warning(

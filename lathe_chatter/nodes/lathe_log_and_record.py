@@ -11,7 +11,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.lathe.change_and_knock_sentences import (
     BEGINNING,
     BEGINNING_AGAIN,
@@ -41,7 +41,7 @@ class LatheRecord:
 
     Raises:
         RunExistsError: If the folder of the run exists.
-        OSError: If it cannot be made.
+        LatheChatterError: If it cannot be made.
     """
 
     def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
@@ -51,7 +51,11 @@ class LatheRecord:
         self._folder, self._failure = values['record'], ''
         if self._folder:
             name = node.get_fully_qualified_name()
-            self._run = LatheRun(Path(self._folder), values, name=name)
+            try:
+                self._run = LatheRun(Path(self._folder), values, name=name)
+            except OSError as error:
+                said = f'record: the run {self._folder} cannot be made: {reason_of(error)}.'
+                raise LatheChatterError(said) from None
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             node.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
         self._log(BEGINNING)
@@ -78,6 +82,12 @@ class LatheRecord:
     def knocked(self, time: float, impulse: float) -> None:
         """The tool was hit with an impulse, N s."""
         self._log(knock_sentence(time, impulse))
+
+    def paced(self, time: float, factor: float) -> None:
+        """Simulated time goes at another pace from a simulated time on, s."""
+        pace = f'{factor:g} times as fast as the clock' if factor else 'as fast as it can'
+        said = f'At {time:.6f} s: the cut goes on {pace}.'
+        self._logger.info(said)
 
     def restarted(self, time: float, old: Cut, new: Cut) -> None:
         """The lathe begins again, with a cut that may have been asked for since its last tick."""

@@ -21,6 +21,7 @@ from lathe_chatter.model.lathe_parameter_table import (
     LATHE,
     cut_from,
     feed_refusal,
+    pace_refusal,
     samples_per_tick,
 )
 from lathe_chatter.model.parameter_table import Value
@@ -129,9 +130,7 @@ class LatheNode(ParameterNode):
         return 1.0 if self._follows else float(self.values['real_time_factor'])  # type: ignore[arg-type]  # a double
 
     def _now(self) -> int:
-        if self._follows:
-            return int(self.get_clock().now().nanoseconds)
-        return time.monotonic_ns()
+        return int(self.get_clock().now().nanoseconds) if self._follows else time.monotonic_ns()
 
     def _start_clock(self) -> None:
         """Let simulated time go on from here; what has passed until now does not count."""
@@ -261,18 +260,20 @@ class LatheNode(ParameterNode):
     # -- the cut ---------------------------------------------------------------------------
 
     def _refusal(self, parameters: list[Parameter]) -> str:
-        """Also of a feed speed that would have no effect."""
+        """Also of a feed speed or a pace that would have no effect."""
         given = dict.fromkeys(self.set_together) | {p.name: p.value for p in parameters}
-        return super()._refusal(parameters) or feed_refusal(given, self.values)
+        said = super()._refusal(parameters) or feed_refusal(given, self.values)
+        return said or (pace_refusal(given, self.values) if self._follows else '')
 
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Queue the new cut for the next tick, or take the new pace at once."""
-        if 'real_time_factor' in changed and not self._follows:
+        if 'real_time_factor' in changed:
             self._change_pace(self._factor)
         if any(row.name in changed for row in CUT_ROWS):
             self._pending = cut_from(self.values)
 
     def _change_pace(self, factor: float) -> None:
+        self._record.paced(self._lathe.time, factor)
         free, self._free = self._free, factor == 0.0
         if free or self._free:
             self._start_clock()

@@ -139,4 +139,12 @@ def test_where_the_samples_are_on_the_clock_is_told_at_each_jump(
 def test_without_a_clock_it_waits_and_says_so(start: Callable[..., Any], bench: Bench) -> None:
     clock = FollowedClock(start, bench)  # a publisher is there, and has shown nothing
     clock.pace('waiting for /clock')
+    clock.said('/clock has shown no time yet: nothing is cut before.')
     assert not clock.joints
+
+
+def test_a_pace_of_its_own_is_refused(start: Callable[..., Any], bench: Bench) -> None:
+    clock = FollowedClock(start, bench)
+    why = 'real_time_factor has no effect under use_sim_time: the pace is that of /clock.'
+    assert bench.set('/lathe', real_time_factor=3.0)[0].reason == why
+    assert clock.node.values['real_time_factor'] == 1.0

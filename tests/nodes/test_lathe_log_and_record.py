@@ -88,6 +88,14 @@ def test_the_lathe_cuts_on_where_its_record_cannot(
     spin_until(lambda: lathe.samples_taken > until, 'more samples')
 
 
+def test_a_record_that_cannot_be_made_is_refused_with_its_parameter(
+    start: Start, tmp_path: Path
+) -> None:
+    (tmp_path / 'file').touch()
+    with pytest.raises(LatheChatterError, match=r'record: the run .* cannot be made: '):
+        start(LatheNode, record=str(tmp_path / 'file' / 'run'))
+
+
 def test_a_lathe_that_records_itself_slows_down_rather_than_lose(
     start: Start, spin_until: Any, tmp_path: Path
 ) -> None:

@@ -335,10 +335,15 @@ def test_the_pace_can_change_from_free_to_timed_and_back(
 ) -> None:
     start(LatheNode, real_time_factor=0.0)
     messages = bench.listen(Float64MultiArray, '/lathe/samples')
-    for factor in (1, 0, 1.5, 0.0):
+    log = bench.listen(Log, '/rosout', LATCHED)
+    paces = ('1 times as fast as the clock', 'as fast as it can', '1.5 times as fast as the clock')
+    for factor, pace in zip((1, 0, 1.5), paces, strict=True):
         assert bench.set('/lathe', real_time_factor=factor)[0].successful
         now = len(messages)
         bench.spin_until(lambda now=now: len(messages) > now + 5, 'more samples')
+        end = f's: the cut goes on {pace}.'
+        bench.spin_until(lambda end=end: any(entry.msg.endswith(end) for entry in log), pace)
+    assert bench.set('/lathe', real_time_factor=0.0)[0].successful
 
 
 def test_the_clock_follows_the_state(start: Callable[..., Any], bench: Bench) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
@@ -182,3 +183,10 @@ def test_what_is_made_of_the_tables_is_current(tmp_path: Path) -> None:
     assert parameter_tables('--root', str(tmp_path)) == 0
     assert page.read_text() == current
     assert parameter_tables('--check', '--root', str(tmp_path)) == 0
+
+
+def test_the_parameter_file_of_a_lathe_overrules_no_machine_file() -> None:
+    template = yaml.safe_load((ROOT / 'config' / 'parameters' / 'lathe.yaml').read_text())
+    given = template['/**/lathe']['ros__parameters']
+    machine = {'machine': 'chucked_shaft'}
+    assert LATHE.complete({**given, **machine}) == LATHE.complete(machine)

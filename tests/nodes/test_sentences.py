@@ -68,6 +68,10 @@ SAID = {
             'the node drives or follows /clock, and the graph has so many publishers of it',
             f'{LATHE}::test_a_second_owner_of_the_clock_is_told',
         ),
+        'use_sim_time is set, and /clock has shown no time yet: nothing is cut before.': (
+            'under use_sim_time, 2 s after the start; told once',
+            f'{CLOCK}::test_without_a_clock_it_waits_and_says_so',
+        ),
         '/clock stands still': (
             'the /clock that is followed has shown the same time for 2 s',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
@@ -258,7 +262,8 @@ SAID = {
 }
 NO_SENTENCE = {
     # Kinds of the bounded log.
-    'clock back', 'clock stands', 'clock ahead', 'clock goes on', 'too many knocks',
+    'clock back', 'clock stands', 'clock awaited', 'clock ahead', 'clock goes on',
+    'too many knocks',
     # Names of hardware and of the values in /diagnostics.
     'virtual lathe', 'real-time factor', 'real-time factor asked for', 'lag given up, s',
     'lag given up in the last second, s', 'step time p50, us', 'step time p99, us',
