@@ -95,6 +95,17 @@ class RunReadError(LatheChatterError):
     """A path that holds no run that can be read; the text says why."""
 
 
+class MixedSamplesError(RunReadError):
+    """The samples of several lathes are mixed in one topic, and are no cut of one lathe."""
+
+    def __init__(self, topic: str, since: float) -> None:
+        """Name the topic, and the simulated time from which on it is so, s."""
+        super().__init__(
+            f'From {since:.6f} s on the samples of several publishers are mixed in {topic}, and '
+            'nobody can tell which is whose.'
+        )
+
+
 class RunExistsError(LatheChatterError):
     """The folder of a new run exists already: nothing recorded is ever overwritten."""
 

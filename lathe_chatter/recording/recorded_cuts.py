@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lathe_chatter.errors import RunReadError
+from lathe_chatter.errors import MixedSamplesError, RunReadError
 from lathe_chatter.recording.cut_log import CutLog, CutSession, Parameters, logger_of
 from lathe_chatter.recording.decoding import decoded
 from lathe_chatter.recording.provenance import PARAMETERS, parameter_history
@@ -61,11 +62,14 @@ def recorded_cuts(
 
     Raises:
         RunReadError: If a file is damaged.
+        MixedSamplesError: If several lathes sent their samples at once.
         LayoutError: If a message is no block of samples.
     """
     timeline, found = read_timeline(
         run, f'{lathe}/samples', lambda topic: topic in (_LOG, _EVENTS) or others(topic)
     )
+    if math.isfinite(mixed := timeline.mixed_at):
+        raise MixedSamplesError(f'{lathe}/samples', mixed)
     log, announced = CutLog(), []
     for each in found:
         if each.raw.topic not in (_LOG, _EVENTS):

@@ -18,7 +18,8 @@ from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.cut_log import CutLog, logger_of
 from lathe_chatter.recording.ros_messages import LOG_TYPE, types
 from lathe_chatter.samples.codec import SAMPLES_TYPE, SampleDecoder
-from lathe_chatter.samples.continuity import BlockOrder, Continuity, missing_in
+from lathe_chatter.samples.continuity import BlockOrder, missing_in
+from lathe_chatter.samples.mixed_streams import MixedContinuity
 
 FLAG_TYPE = 'std_msgs/msg/Bool'
 _FLAG_BYTE = 4
@@ -57,26 +58,31 @@ class SamplesReceived:
         continuity: Counts samples, gaps, lost samples and restarts.
         first: Simulated time of the first sample, s; None before it.
         head: Samples that the lathe took before the first one that came.
+        silent: Whether none came between the last two looks, though some had before.
         silences: How often it published nothing for much longer than usual.
         longest: The longest time from one block to the next, s.
         pauses: Simulated times before and after what the recorder left out in pauses, s.
         complaint: What is wrong with the layout of a message; empty where all is well.
+        mixture: Who sends at once what only one may, a sentence of the recorder; else empty.
         discontinuities: The latest places where samples are missing or begin, until they are
             logged.
     """
 
-    continuity: Continuity = field(default_factory=Continuity)
+    continuity: MixedContinuity = field(default_factory=MixedContinuity)
     first: float | None = None
     head: int = 0
+    silent: bool = False
     silences: int = 0
     longest: float = 0.0
     pauses: list[tuple[float, float]] = field(default_factory=list)
     complaint: str = ''
+    mixture: str = ''
     discontinuities: deque[Discontinuity] = field(
         default_factory=lambda: deque(maxlen=_MAX_DISCONTINUITIES)
     )
     _decoder: SampleDecoder = field(default_factory=SampleDecoder)
     _published: int = 0
+    _seen: int = 0
     _paused: bool = False
     _usual: float = 0.0
     _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_MAX_BLOCKS))
@@ -111,6 +117,11 @@ class SamplesReceived:
                 return
         if order is BlockOrder.CONTIGUOUS:
             return
+        if order is BlockOrder.RETURN:
+            for each in [*self.discontinuities]:
+                if (each.before, each.after) == self.continuity.undone:
+                    self.discontinuities.remove(each)
+            return
         first, missing = float(times[0]), self.continuity.lost - lost
         if order is not BlockOrder.GAP:
             step = (float(times[-1]) - first) / (len(times) - 1) if len(times) > 1 else first
@@ -123,6 +134,11 @@ class SamplesReceived:
     def restarted(self) -> bool:
         """Whether a lathe began again, and that is not logged yet."""
         return any(each.order is BlockOrder.RESTART for each in self.discontinuities)
+
+    def look(self, *, awaited: bool) -> None:
+        """Notice from time to time whether samples have come, where they are awaited."""
+        self.silent = awaited and self.continuity.samples == self._seen
+        self._seen = self.continuity.samples
 
     def pause(self) -> None:
         """Blocks are left out from now on."""

@@ -14,7 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lathe_chatter.errors import LayoutError, ParameterError, ReplayError, RunReadError
+from lathe_chatter.errors import (
+    LayoutError,
+    MixedSamplesError,
+    ParameterError,
+    ReplayError,
+    RunReadError,
+)
 from lathe_chatter.recording.cut_log import CutSession
 from lathe_chatter.recording.provenance import (
     IDENTITY,
@@ -87,7 +93,10 @@ def resimulate(run: Run | Path | str) -> list[Resimulation]:
 
 
 def _resimulated(run: Run, topic: str) -> Resimulation:
-    cuts = recorded_cuts(run, topic.removesuffix('/samples'))
+    try:
+        cuts = recorded_cuts(run, topic.removesuffix('/samples'))
+    except MixedSamplesError as error:
+        return Resimulation(topic, obstacle=str(error))
     found = _replayed(run, topic, cuts)
     found.contradictions = cuts.log.contradictions
     if found.contradictions and not found.reproduced:

@@ -75,7 +75,7 @@ def _samples(received: SamplesReceived) -> dict[str, Any]:
         'restarts': counted.restarts,
         'silences': received.silences,
         'longest_silence': received.longest,
-        'complaint': received.complaint,
+        'complaint': received.mixture or received.complaint,
     }
 
 

@@ -20,6 +20,7 @@ from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
 from lathe_chatter.recording.recorded_file import Raw, RecordedFile
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
+from lathe_chatter.samples.mixed_streams import mixed_at
 
 _STEP_BACK = 10_000_000
 """ns by which stamps of one topic go back where the clock does, and never else."""
@@ -67,6 +68,14 @@ class Timeline:
     def restarts(self) -> Integers:
         """Blocks whose simulated time is not after that of the block before."""
         return np.flatnonzero(self.first[1:] <= self.last[:-1]) + 1
+
+    @property
+    def mixed_at(self) -> float:
+        """Simulated time at which several lathes are seen to have sent at once, s; else nan."""
+        some = self.rows > 1
+        steps = (self.last - self.first)[some] / (self.rows[some] - 1)
+        step = float(np.median(steps)) if steps.size else 0.0
+        return mixed_at(self.last[:-1], self.first[1:], step)
 
     @cached_property
     def _known_offsets(self) -> Integers:

@@ -32,6 +32,7 @@ from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification_result import Finding, SampleCount, Verification
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.samples.continuity import Continuity, missing_in, time_text
+from lathe_chatter.samples.mixed_streams import MixedContinuity
 
 __all__ = ['Finding', 'SampleCount', 'Verification', 'verify']
 
@@ -162,7 +163,7 @@ def _check_samples(found: Verification, progress: Progress) -> None:
     for topic, kind in sorted(found.run.topics.items()):
         if kind != SAMPLES_TYPE or not topic.endswith('/samples'):
             continue
-        continuity = Continuity(remember=True)
+        continuity = MixedContinuity(remember=True)
         count, first, last, strange = 0, math.nan, math.nan, 0
         try:
             for block in found.run.sample_blocks(topic, columns=()):
@@ -185,6 +186,13 @@ def _check_samples(found: Verification, progress: Progress) -> None:
             found.remark(
                 f'{topic}: the record begins at {time_text(first)} of simulated time, '
                 f'{late} samples late.'
+            )
+        if continuity.mixed:
+            found.add_loss(
+                f'{topic}: samples of several publishers are mixed, first at '
+                f'{time_text(continuity.mixed_from)} and last at '
+                f'{time_text(continuity.mixed_until)} of simulated time, which goes to and fro '
+                f'{continuity.mixed} times there: whether any are missing cannot be told.'
             )
         _report_breaks(found, topic, continuity)
 

@@ -10,7 +10,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LayoutError
 
-_LONGEST_STEP = 1.5
+LONGEST_STEP = 1.5
 """Of the usual step of time between two samples: one that is longer is a gap."""
 _COUNTABLE = 1e12
 """Of samples and seconds: more are no count and no time, but a damaged number."""
@@ -27,6 +27,8 @@ class BlockOrder(str, Enum):
     """Samples are missing in between."""
     RESTART = 'restart'
     """Simulated time has gone back, or the lathe is another: another run."""
+    RETURN = 'return'
+    """What was left for others goes on: several lathes send at once (`MixedContinuity`)."""
 
 
 class Continuity:
@@ -88,7 +90,7 @@ class Continuity:
         steps = joined[1:] - joined[:-1]
         while steps.size:
             self.step = self.step or _usual(steps)
-            if steps.min() > 0.0 and steps.max() <= _LONGEST_STEP * self.step:
+            if steps.min() > 0.0 and steps.max() <= LONGEST_STEP * self.step:
                 return
             begun = self._follow_broken(joined, steps)
             joined, steps = joined[begun:], steps[begun:]
@@ -96,7 +98,7 @@ class Continuity:
     def _follow_broken(self, joined: Array, steps: Array) -> int:
         """Find where steps (n - 1,) between times (n,) are none; how many times were followed."""
         # So that a time which is no number is a restart too.
-        longest = _LONGEST_STEP * self.step if self.step else np.inf
+        longest = LONGEST_STEP * self.step if self.step else np.inf
         for place in np.flatnonzero(~((steps > 0.0) & (steps <= longest))).tolist():
             order = self._order(float(joined[place]), float(joined[place + 1]))
             rest = steps[place + 1 :]
@@ -112,7 +114,7 @@ class Continuity:
     ) -> BlockOrder:
         """Note how a sample follows the one before, by their times, s."""
         place = before, after
-        gap = 0.0 < _LONGEST_STEP * self.step < after - before
+        gap = 0.0 < LONGEST_STEP * self.step < after - before
         if not after > before or (gap and is_another()):
             self.restarts += 1
             if self._remember:
@@ -165,4 +167,4 @@ def follow_evenly(times: Array) -> bool:
     steps = times[1:] - times[:-1]
     if not steps.size:
         return bool(np.isfinite(times).all())
-    return bool(0.0 < steps.max() < _LONGEST_STEP * steps.min())
+    return bool(0.0 < steps.max() < LONGEST_STEP * steps.min())
