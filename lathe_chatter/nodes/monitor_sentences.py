@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from lathe_chatter.detection import Estimate
+from lathe_chatter.nodes.polled_subscription import several_publish
 
 
 class Sentence(NamedTuple):
@@ -172,7 +173,4 @@ def sensors(estimate: Estimate) -> str:
 
 def two_publishers(names: Sequence[str]) -> str:
     """Who publishes what only one may."""
-    return (
-        f'{", ".join(names[:-1])} and {names[-1]} publish lathe/samples, not one lathe: '
-        'nothing is judged until one is left.'
-    )
+    return f'{several_publish(names, "lathe/samples")}: nothing is judged until one is left.'

@@ -6,7 +6,7 @@ a quarter of a core. Who takes what has come in one go, some times a second, pay
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -24,6 +24,11 @@ def publisher_names(node: Node, topic: str) -> list[str]:
     """
     offers = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
     return sorted(f'{offer.node_namespace.rstrip("/")}/{offer.node_name}' for offer in offers)
+
+
+def several_publish(names: Sequence[str], topic: str) -> str:
+    """That several nodes, by their full names, publish what only one may, without a stop."""
+    return f'{", ".join(names[:-1])} and {names[-1]} publish {topic}, not one lathe'
 
 
 class _NeverReady(CallbackGroup):  # type: ignore[misc]  # rclpy has no type information

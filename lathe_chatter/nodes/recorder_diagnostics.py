@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
 
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
+from lathe_chatter.nodes.polled_subscription import publisher_names, several_publish
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
+from lathe_chatter.nodes.recorder_topic_selection import TopicWatch
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
-from lathe_chatter.recording.recording_statistics import Discontinuity, RunLog
+from lathe_chatter.recording.recording_statistics import Discontinuity, RunLog, SamplesReceived
 from lathe_chatter.samples.continuity import BlockOrder
 
 
 def recording_status(
     run: Path | None,
     failure: str,
-    topics: Mapping[str, RecordedTopic],
+    watch: TopicWatch | None,
     log: RunLog,
     stalls: ReceiveStalls,
 ) -> Status:
@@ -24,10 +29,11 @@ def recording_status(
     Args:
         run: Its folder; None while nothing is recorded.
         failure: Why a recording ended that should not have; empty where none did.
-        topics: By name.
+        watch: Over its topics; None before the first run.
         log: Of the run.
         stalls: Of the recorder.
     """
+    topics = {} if watch is None else watch.topics
     values = {
         'run': str(run or ''),
         'messages': str(sum(topic.messages for topic in topics.values())),
@@ -47,28 +53,52 @@ def recording_status(
     if failure:
         return Status('recording', ERROR, failure, values)
     complaints = [*_complaints(topics, log)]
+    complaints += [f'nobody publishes {name}' for name in (watch.awaited if watch else ())]
     said = '; '.join(['recording' if run else 'not recording', *complaints])
-    return Status('recording', WARN if complaints else OK, said, values)
+    mixed = any(received.mixture for received in log.samples.values())
+    return Status('recording', ERROR if mixed else WARN if complaints else OK, said, values)
 
 
-def news(log: RunLog) -> Iterator[str]:
-    """Sentences about where samples began, began again or are missing; each is said once.
+def mixture(node: Node, topic: str, received: SamplesReceived) -> str:
+    """Who sends the samples of a topic at once, a sentence; empty if nobody, or it was said.
 
     Args:
-        log: Of the run; the discontinuities that are said are taken away.
+        node: That knows who publishes.
+        topic: Of the samples.
+        received: Of them; it keeps what is said.
     """
+    if received.mixture or not received.continuity.mixed:
+        return ''
+    names = publisher_names(node, topic)
+    who = several_publish(names, topic) if len(names) > 1 else f'several publish {topic}'
+    received.mixture = f'{who}: their samples are mixed, and whether any are missing is not known'
+    return f'{received.mixture}.'
+
+
+def log_news(logger: Any, log: RunLog) -> str:
+    """Say where samples began, began again or are missing; each is said once.
+
+    Args:
+        logger: Of the node.
+        log: Of the run; the discontinuities that are said are taken away.
+
+    Returns:
+        What was said last; empty where there was nothing to say.
+    """
+    said = ''
     for name, received in log.samples.items():
         gaps = [place for place in received.discontinuities if place.order is BlockOrder.GAP]
         for place in received.discontinuities:
             if place.order is not BlockOrder.GAP:
-                yield f'{name} {_begins(place)}.'
+                said = f'{name} {_begins(place)}.'
+                logger.info(said)
         if gaps:  # there may be many
             missing = sum(place.missing for place in gaps)
-            yield (
-                f'{name}: {missing} samples between {gaps[0].before:.6f} s and '
-                f'{gaps[-1].after:.6f} s did not come.'
-            )
+            where = f'between {gaps[0].before:.6f} s and {gaps[-1].after:.6f} s'
+            said = f'{name}: {missing} samples {where} did not come.'
+            logger.warning(said)
         received.discontinuities.clear()
+    return said
 
 
 def _begins(place: Discontinuity) -> str:
@@ -85,5 +115,9 @@ def _complaints(topics: Mapping[str, RecordedTopic], log: RunLog) -> Iterator[st
     for name, received in log.samples.items():
         if received.continuity.lost:
             yield f'{received.continuity.lost} samples of {name} are missing'
+        if received.mixture:
+            yield received.mixture
         if received.complaint:
             yield f'{name}: {received.complaint}'
+        if received.silent:
+            yield f'no samples of {name} come'

@@ -18,7 +18,7 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import RECORDER
 from lathe_chatter.nodes.real_time_loop import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
-from lathe_chatter.nodes.recorder_diagnostics import news, recording_status
+from lathe_chatter.nodes.recorder_diagnostics import log_news, mixture, recording_status
 from lathe_chatter.nodes.recorder_topic_selection import TopicWatch, selection
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.run_folders import RunFolders
@@ -342,16 +342,16 @@ class RecorderNode(ParameterNode):
         for topic, received in self._log.samples.items():
             if received.restarted:
                 self._remote.want_again(topic.removesuffix('/samples'))
+            if who := mixture(self, topic, received):
+                self.get_logger().error(who)
         now = time.monotonic()
         if not last and now <= self._next_news:
             return
-        sentences = [*news(self._log)]
-        if sentences:  # a place where samples are missing seldom comes alone
+        said = log_news(self.get_logger(), self._log)
+        if said:  # a place where samples are missing seldom comes alone
             self._next_news = now + _NEWS_PERIOD
-        for sentence in sentences:
-            self.get_logger().info(sentence)
-        if last and sentences and '/rosout' in self._topics:
-            self._record_until(sentences[-1])
+        if last and said and '/rosout' in self._topics:
+            self._record_until(said)
 
     def _record_until(self, sentence: str) -> None:
         """Record until a sentence of its own has come."""
@@ -372,10 +372,13 @@ class RecorderNode(ParameterNode):
         raise RecordingFailedError(said) from None
 
     def _report(self) -> None:
+        awaited = self._sink is not None and self._watch is not None and not self._watch.paused
+        for received in self._log.samples.values():
+            received.look(awaited=awaited)
         self._diagnostics.publish([self._status()])
 
     def _status(self) -> Status:
-        return recording_status(self.run, self._failure, self._topics, self._log, self._stalls)
+        return recording_status(self.run, self._failure, self._watch, self._log, self._stalls)
 
 
 def main() -> None:

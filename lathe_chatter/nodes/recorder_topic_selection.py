@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.parameter_tables import RECORDED_TOPICS
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic, Write, topic_of
 from lathe_chatter.nodes.topic_types import MissingTypeError, message_type
 from lathe_chatter.recording import Topic
@@ -25,6 +26,8 @@ _LOOK_CLOSELY = 0.5
 """s after which the publishers of a topic are looked at even if they are as many as before."""
 _DISCOVERY = 1.0
 """s after the start of a recording: what is found by then may have been there before."""
+_EXPECTED = 5.0
+"""s after the start of a recording by which somebody publishes what was asked for by name."""
 
 
 class Sink(Protocol):
@@ -46,6 +49,7 @@ class Selection(NamedTuple):
 
     Attributes:
         names: By their full names.
+        asked: Those of them that are none of the default ones: who names a topic expects it.
         every: Whether all that there are.
         like: Whose names match; None where none is.
         unlike: Those whose names match are left out; None where none is.
@@ -53,6 +57,7 @@ class Selection(NamedTuple):
     """
 
     names: frozenset[str]
+    asked: frozenset[str]
     every: bool
     like: re.Pattern[str] | None
     unlike: re.Pattern[str] | None
@@ -75,10 +80,11 @@ def selection(node: Node, values: dict[str, Any]) -> Selection:
     Raises:
         LatheChatterError: If an expression is none.
     """
-    names = frozenset(node.resolve_topic_name(name) for name in values['topics'])
+    names = {node.resolve_topic_name(name): name for name in values['topics']}
+    asked = frozenset(name for name, given in names.items() if given not in RECORDED_TOPICS)
     like, unlike = (_pattern(name, values[name]) for name in ('topics_like', 'exclude'))
     repeat = values['repeat_latched'] or values['snapshot'] > 0.0
-    return Selection(names, values['all_topics'], like, unlike, repeat)
+    return Selection(frozenset(names), asked, values['all_topics'], like, unlike, repeat)
 
 
 def _pattern(name: str, text: str) -> re.Pattern[str] | None:
@@ -101,6 +107,7 @@ class TopicWatch:
 
     Attributes:
         topics: Those that have appeared, by their full names.
+        awaited: Those that were asked for by name, and that nobody has published so far.
         refused: Types that are not installed, by the names of topics that are not recorded.
         paused: Whether what comes is left out.
     """
@@ -108,6 +115,7 @@ class TopicWatch:
     def __init__(self, node: Node, wanted: Selection, sink: Sink, write: Write) -> None:
         """Begin with none found."""
         self.topics: dict[str, RecordedTopic] = {}
+        self.awaited: list[str] = []
         self.refused: dict[str, str] = {}
         self._node, self._sink, self._write = node, sink, write
         self._wanted = wanted
@@ -115,7 +123,7 @@ class TopicWatch:
         self._former: dict[str, dict[str, int]] = {}
         self._met: dict[str, set[tuple[int, ...]]] = {}
         self._counts: dict[str, int] = {}
-        self._look_closely = 0.0
+        self._look_closely, self._warned = 0.0, False
         self._since, self._began = time.time_ns(), time.monotonic()
 
     def look(self, on_publisher: Callable[[str, str], None], *, closely: bool = False) -> None:
@@ -150,6 +158,18 @@ class TopicWatch:
             if len(met) > known:
                 counts = {each: str(len(those)) for each, those in self._met.items() if those}
                 self._sink.note(PUBLISHERS, counts)
+        if closely and time.monotonic() >= self._began + _EXPECTED:
+            self._await()
+
+    def _await(self) -> None:
+        """Notice what was asked for by name and never came: the name may be misspelt."""
+        named = (name for name in self._wanted.among(()) if name in self._wanted.asked)
+        self.awaited = [name for name in named if not self._met.get(name)]
+        if self.awaited and not self._warned:
+            self._node.get_logger().warning(
+                f'Nobody publishes {", ".join(self.awaited)} so far: nothing of it is recorded.'
+            )
+        self._warned = True
 
     def take(self) -> None:
         """Take what has arrived."""

@@ -14,7 +14,7 @@ from std_msgs.msg import Float64MultiArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.nodes.polled_subscription import PolledSubscription, publisher_names
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.samples.continuity import follow_evenly
 
@@ -81,10 +81,7 @@ class SampleSubscription:
 
     def publishers(self) -> list[str]:
         """Full names of the nodes that publish, sorted; one that does so twice stands twice."""
-        names = [
-            f'{each.node_namespace.rstrip("/")}/{each.node_name}' for each in self._endpoints()
-        ]
-        return sorted(names)
+        return publisher_names(self._node, _TOPIC)
 
     def adapt(self) -> bool:
         """Ask for no more than every publisher offers; whether that made a difference."""
