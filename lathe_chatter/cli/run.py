@@ -114,10 +114,8 @@ def run(options: Namespace) -> int:
     if interrupted:
         screen.say('Interrupted: the run above is recorded up to that moment.')
         return INTERRUPTED
-    said = {
-        FLAGGED: any(flag.chatter for flag in history.flags),
-        CLEARED: bool(history.flags) and not history.flags[-1].chatter,
-    }
+    flags = [flag.chatter for flag in history.flags if not flag.started]
+    said = {FLAGGED: any(flags), CLEARED: flags[-1:] == [False]}
     return verdict(scenario, said, screen)
 
 

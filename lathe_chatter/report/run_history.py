@@ -54,12 +54,14 @@ class Flag:
         chatter: What the flag said.
         frequency: Hz, nan where unknown.
         growth_rate: 1/s, nan where unknown.
+        started: Whether the monitor was started anew: its flag says nothing of before.
     """
 
     time: float
     chatter: bool
     frequency: float = float('nan')
     growth_rate: float = float('nan')
+    started: bool = False
 
 
 class Ramp(NamedTuple):
@@ -241,6 +243,8 @@ def in_words(event: Session | Change | Knock | Flag) -> str:
         return ', '.join(on_the_shop_floor(*changed) for changed in event.new.items())
     if isinstance(event, Knock):
         return f'knock, {text_of(event.impulse, "N s")}'
+    if event.started:
+        return 'the monitor was started anew'
     return 'chatter flagged' if event.chatter else 'flag cleared'
 
 
@@ -343,16 +347,23 @@ class _Dated:
         return np.array([[self._time(each) for each in found], values], dtype=float)
 
     def flags(self, estimates: dict[str, Array]) -> list[Flag]:
-        """Every change of the flag."""
+        """Every change of the flag, and where a monitor was started anew, with its flag down."""
         flags: list[Flag] = []
-        up = False
+        up, numbers = False, dict[str, tuple[int, int]]()
         for each in self._of('chatter'):
-            chatter = bool(message_of(each).data)
+            raw, chatter = each.raw, bool(message_of(each).data)
+            # A file that begins with a message of the one before has it once more, as it was.
+            number, published = numbers.get(raw.topic, (0, 0))
+            numbers[raw.topic] = raw.sequence, raw.publish_time
+            if 0 < raw.sequence <= number and raw.publish_time != published:
+                up = False
+                flags.append(Flag(self._time(each), chatter=False, started=True))
             if chatter == up:
                 continue
             up, time = chatter, self._time(each)
-            at = {name: value_near(estimates[name], time) for name in ('frequency', 'growth_rate')}
-            flags.append(Flag(time, up, **at))
+            at = (value_near(estimates[name], time) for name in ('frequency', 'growth_rate'))
+            frequency, growth_rate = at
+            flags.append(Flag(time, up, frequency, growth_rate))
         return flags
 
     def _of(self, name: str) -> list[Placed]:
