@@ -114,7 +114,7 @@ def run(options: Namespace) -> int:
     with writing(options.output):
         draw_knock_map(knocks, options.output)
     _show(knocks, screen)
-    say_what_is_assumed(config.described, screen, config.machine)
+    say_what_is_assumed(config.described, screen, config.machine, config.cut)
     screen.name_file('points', options.output)
     for file in files:
         screen.name_file('picture', file)

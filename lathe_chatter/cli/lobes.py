@@ -150,7 +150,7 @@ def run(options: Namespace) -> int:
     if growth is not None or probability is not None:
         kept.unlink(missing_ok=True)
     _show(config, limits, screen)
-    say_what_is_assumed(config.described, screen, config.machine)
+    say_what_is_assumed(config.described, screen, config.machine, config.cut)
     for sentence in _doubts(config, limits):
         screen.say(f'WARNING  {sentence}')
     figures = _figures(config, limits, growth)

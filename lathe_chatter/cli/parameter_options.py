@@ -8,7 +8,7 @@ from typing import Any
 
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.lathe.config import LatheConfig, config_from
-from lathe_chatter.model import Machine
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.model.machine_file import MachineDescription
 
@@ -75,7 +75,10 @@ def given_parameters(options: Namespace) -> dict[str, Any]:
 
 
 def say_what_is_assumed(
-    described: MachineDescription | None, screen: Screen, machine: Machine | None = None
+    described: MachineDescription | None,
+    screen: Screen,
+    machine: Machine | None = None,
+    cut: Cut | None = None,
 ) -> None:
     """Warn of a machine file that lacks what the paper's machine stands in for.
 
@@ -83,8 +86,9 @@ def say_what_is_assumed(
         described: The file, if there is one.
         screen: Where it is said.
         machine: That is taken, see `MachineDescription.assumption`.
+        cut: Likewise.
     """
-    if described and (said := described.assumption(machine)):
+    if described and (said := described.assumption(machine, cut)):
         screen.say(f'WARNING  {said}')
 
 

@@ -160,7 +160,7 @@ def _machine(
     doubts: list[str] = []
     for source, one in described.items():
         config = config_from({**firsts, MACHINE_FILE.name: files.get(source, '')})
-        doubts += filter(None, [one.assumption(config.machine)])
+        doubts += filter(None, [one.assumption(config.machine, config.cut)])
         if errors == OF_FILE and not one.uncertainty:
             raise section.refused(f'errors is file: {source or "no file that"} has none')
         if errors not in {'', OF_FILE}:

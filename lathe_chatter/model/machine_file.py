@@ -119,11 +119,12 @@ class MachineDescription:
             f'{self.slowest_speed:g} to {self.fastest_speed:g} rev/min.'
         )
 
-    def assumption(self, machine: Machine | None = None) -> str:
+    def assumption(self, machine: Machine | None = None, cut: Cut | None = None) -> str:
         """That the paper's machine stands in for what the file lacks, a sentence; else empty.
 
         Args:
             machine: That is taken: what it has otherwise than the file was given beside it.
+            cut: That is taken; it may have a bearing contact of which the file knows nothing.
         """
         taken = machine or self.machine
         lacking = [
@@ -132,7 +133,7 @@ class MachineDescription:
             if getattr(taken, name) == getattr(self.machine, name)
         ]
         if not lacking:
-            return ''
+            return self._bearing_assumed(taken, cut or self.cut)
         if 'workpiece' in self.assumed and self.cut.bearing_contact is not BearingContact.NONE:
             clearance = self.cut.bearing_clearance * 1e6
             gap = f', with a bearing clearance of {clearance:g} um'
@@ -141,6 +142,17 @@ class MachineDescription:
         return (
             f'The machine file {self.name} lacks {" and ".join(lacking)}: what the paper has is '
             f'taken{gap}.'
+        )
+
+    def _bearing_assumed(self, taken: Machine, cut: Cut) -> str:
+        """That a bearing of which the file has nothing is the paper's, or nothing."""
+        usual = Machine(taken.tool, taken.workpiece).bearing_stiffness
+        without = self.cut.bearing_contact is BearingContact.NONE is not cut.bearing_contact
+        if not without or taken.bearing_stiffness != usual:
+            return ''
+        return (
+            f'The machine file {self.name} has no bearing: {usual:.4g} N/m is taken as its '
+            'stiffness, half of that of the workpiece as in the paper.'
         )
 
     def text(self) -> str:

@@ -62,7 +62,8 @@ class LatheRecord:
         config = recorded_config(values)
         self._setup, self._doubts = config.setup, list[str]()
         self._described, self._speed_doubt = config.described, ''
-        if config.described and (lacking := config.described.assumption(config.machine)):
+        file = config.described
+        if file and (lacking := file.assumption(config.machine, config.cut)):
             self._logger.warning(lacking)
         self._doubt(config.cut)
 

@@ -179,7 +179,9 @@ class _Simulation:
     def log_doubts(self) -> None:
         """Why the samples may not be what was meant; each sentence once."""
         speed = self.described.speed_doubt(self._lathe.cut) if self.described else ''
-        lacking = self.described.assumption(self._lathe.machine) if self.described else ''
+        lacking = ''
+        if self.described:
+            lacking = self.described.assumption(self._lathe.machine, self._lathe.cut)
         for sentence in (*self._lathe.doubts, speed, lacking):
             if sentence and sentence not in self._doubts:
                 self._doubts.append(sentence)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lathe_chatter.array_types import Array
+from lathe_chatter.array_types import Array, ShortRepr
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantity_fields import check_choice
 from lathe_chatter.resumable_results import spread_into
@@ -22,8 +22,8 @@ from lathe_chatter.stability.safe_limit import safe_limit
 from lathe_chatter.stability.speed_variation import varied_growth_rates
 
 
-@dataclass(frozen=True)
-class GrowthMap:
+@dataclass(frozen=True, repr=False)
+class GrowthMap(ShortRepr):
     """How fast a small vibration grows.
 
     Attributes:

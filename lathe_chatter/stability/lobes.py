@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from lathe_chatter.array_types import Array, Integers
+from lathe_chatter.array_types import Array, Integers, ShortRepr
 from lathe_chatter.model import Machine
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.characteristic import (
@@ -36,8 +36,8 @@ _POINTS = Quantity('points of a lobe', low=2.0, high=1e7)
 _DEPTH_LIMIT = Quantity('largest depth of the boundary', 'm', high=1e3, exclusive=True)
 
 
-@dataclass(frozen=True)
-class LobeBoundary:
+@dataclass(frozen=True, repr=False)
+class LobeBoundary(ShortRepr):
     """Points of the stability boundary, one row for each lobe.
 
     Attributes:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.array_types import Array
+from lathe_chatter.array_types import Array, ShortRepr
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantity_fields import Quantity, count_of
 from lathe_chatter.model.uncertainty import Uncertainty
@@ -27,8 +27,8 @@ from lathe_chatter.stability.safe_limit import safe_limit
 _SHARE = Quantity('probability', low=0.0, high=1.0)
 
 
-@dataclass(frozen=True)
-class StabilityProbability:
+@dataclass(frozen=True, repr=False)
+class StabilityProbability(ShortRepr):
     """The limits of many machines that the truth may be.
 
     Attributes:

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lathe_chatter.array_types import Array
+from lathe_chatter.array_types import Array, ShortRepr
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.stability.characteristic import (
@@ -40,8 +40,8 @@ _AS_LOW = 1.005
 _FEED = Quantity('feed per revolution f', 'm')
 
 
-@dataclass(frozen=True)
-class SafeLimit:
+@dataclass(frozen=True, repr=False)
+class SafeLimit(ShortRepr):
     """The limits of depth at some spindle speeds; all arrays have one shape.
 
     Attributes:

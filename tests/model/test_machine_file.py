@@ -295,3 +295,12 @@ def test_what_stands_in_for_what_a_file_lacks_is_said() -> None:
     assert not load_machine('spindle: {fastest_speed: 3000 rpm}\n').assumption()
     for machine in shipped_machines():
         assert not load_machine(machine).assumption()
+
+
+def test_a_bearing_of_which_a_file_has_nothing_is_said_to_be_assumed() -> None:
+    found = load_machine(TOOL_ALONE + TOOL_ALONE.replace('tool', 'workpiece') + STEEL)
+    assert not found.assumption(cut=found.cut)
+    said = found.assumption(cut=replace(found.cut, bearing_contact=BearingContact.GAP))
+    assert 'has no bearing: 5e+06 N/m is taken as its stiffness' in said
+    given = replace(found.machine, bearing_stiffness=2e7)
+    assert not found.assumption(given, replace(found.cut, bearing_contact=BearingContact.SEATED))

@@ -22,6 +22,14 @@ MACHINE = Machine()
 SPEEDS, DEPTHS = np.linspace(2000.0, 6000.0, 9), np.linspace(0.2e-3, 1.2e-3, 6)
 
 
+def test_a_map_is_shown_on_a_line() -> None:
+    shown = repr(growth_map(MACHINE, Cut(), np.linspace(2000.0, 6000.0, 30), DEPTHS))
+    assert shown.startswith('GrowthMap(spindle_speed_rpm=<30, 2000 to 6000>, depth_of_cut=<6, ')
+    assert 'growth_rate=<6 x 30, ' in shown
+    assert 'of 180 true>' in shown
+    assert len(shown) < 300
+
+
 @pytest.mark.parametrize('contact', list(BearingContact))
 def test_each_point_is_the_root_in_its_contact(contact: BearingContact) -> None:
     cut = Cut(bearing_contact=contact)
