@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _LABEL_WIDTH = 0.12
 """Of the picture, that a label above it takes."""
+_HIGHEST = 160
+"""Points above the plot up to which labels stand: more would leave no room to the plots."""
 _GAPS = 200
 """That are hatched at most."""
 _SILENCE = 0.2
@@ -186,16 +188,23 @@ def _label_changes(axes: Axes, history: History) -> None:
     labels += [(start, 'chatter flagged', ALARM_TEXT) for start, _ in spans[:1]]
     labels += [(before, 'samples missing', 'k') for before, _ in history.samples.gaps[:1]]
     length = history.duration - history.begin
-    last, height = -math.inf, 4
+    last, height, left_out = -math.inf, 4, 0
     for at, text, colour in sorted(labels):
         time = min(max(at, history.begin), history.duration)
         # One that would run into the one before stands above it.
         near = time - last < _LABEL_WIDTH * length
-        height = height + 12 * (text.count('\n') + 1) if near else 4
-        last = time
+        above = height + 12 * (text.count('\n') + 1) if near else 4
+        if above > _HIGHEST:
+            left_out += 1
+            continue
+        last, height = time, above
         late = time > history.duration - 0.5 * _LABEL_WIDTH * length
         axes.annotate(
             text, (time, 1.0), (-3 if late else 3, height), xycoords=('data', 'axes fraction'),
             textcoords='offset points', fontsize=9, va='bottom', color=colour,
             ha='right' if late else 'left',
         )  # fmt: skip
+    if left_out:
+        axes.set_title(
+            f'{left_out} more are in the table', fontsize=9, loc='left', pad=_HIGHEST + 24
+        )

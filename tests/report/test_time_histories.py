@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from lathe_chatter.lathe import VirtualLathe
+from lathe_chatter.lathe.change_and_knock_sentences import Knock
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.report.plotted_samples import RunSamples
 from lathe_chatter.report.run_history import History
@@ -55,3 +57,19 @@ def test_a_gap_is_left_open() -> None:
     assert len(drawn) == 2001
     assert np.flatnonzero(np.isnan(drawn)).tolist() == [1000]
     assert 'samples missing' in [text.get_text() for text in panels[0].texts]
+
+
+def test_labels_of_much_that_happens_leave_room_to_the_plots() -> None:
+    lathe = VirtualLathe()
+    samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(5000).T, strict=True))
+    knocks = [Knock(0.1 + 1e-4 * k, 0.01) for k in range(200)]
+    run = History(Path('run'), Machine(), Cut(), RunSamples.of(samples), knocks=knocks)
+    figure = Figure(figsize=(12.0, 9.0), layout='constrained')
+    panels = figure.subplots(4)
+    draw_time_histories(panels, run)
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        figure.draw_without_rendering()
+    labels = [text.get_text() for text in panels[0].texts]
+    assert f'{200 - len(labels)} more are in the table' == panels[0].get_title(loc='left')
+    assert all(axes.get_position().height > 0.05 for axes in panels)
