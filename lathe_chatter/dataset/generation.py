@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import shutil
+import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import closing
-from dataclasses import replace
+from contextlib import closing, nullcontext
 from functools import partial
-from importlib.resources import files as package_files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from jinja2 import StrictUndefined, Template
 
 from lathe_chatter.code_identity import code_identity
-from lathe_chatter.dataset.file_formats import ENDINGS, Files, files_of, read_part
 from lathe_chatter.dataset.plan import Form, Plan
-from lathe_chatter.dataset.windows import Table, drawn_machine, unit_of, windows_of
-from lathe_chatter.errors import DatasetError, reason_of
+from lathe_chatter.dataset.windows import DrawnRun, Table, drawn_machine, unit_of, windows_of
+from lathe_chatter.errors import DatasetError, optional, reason_of
 from lathe_chatter.executors import run_batches
+from lathe_chatter.lathe.change_and_knock_sentences import Knock
 from lathe_chatter.model.lathe_parameter_table import LATHE
-from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.resumable_results import ResultFile
+from lathe_chatter.shipped_files import rendered
 
+ENDINGS = {Form.PARQUET: '.parquet', Form.HDF5: '.h5', Form.ZARR: '.zarr', Form.MCAP: '_runs'}
+Files = dict[str, bytes]
+"""What a part consists of, by path in its folder; a part that is one file is `.`."""
 MANIFEST, CARD = 'manifest.jsonl', 'README.md'
 _PART_SIZE = 8e6
 """Bytes of a part, where one machine has not more: some seconds of work, and little to lose."""
@@ -48,14 +51,9 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
     """The bytes of a part, and what the manifest says of it."""
     machines = {number: drawn_machine(plan, number) for number in part[1]}
     table, runs = windows_of(plan, machines)
-    files = files_of(plan.form, table, runs, plan.duration)
-    count, digest = len(table['machine']), hashlib.sha256()
-    for values in table.values():
-        digest.update(np.ascontiguousarray(values).data)
-    described = {
-        number: replace(config.described or MachineDescription(), machine=config.machine)
-        for number, config in machines.items()
-    }
+    files = _files_of(plan, table, runs)
+    count = len(table['machine'])
+    digest = hashlib.sha256(b''.join(values.tobytes() for values in table.values()))
     return files, {
         'part': part[0],
         'windows': count,
@@ -63,7 +61,7 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
         'ended_early': len(runs) * len(plan.starts) - count,
         'windows_sha256': digest.hexdigest(),
         'files': {n: [len(b), hashlib.sha256(b).hexdigest()] for n, b in files.items()},
-        'machines': {number: machine.sections() for number, machine in described.items()},
+        'machines': {number: config.description.sections() for number, config in machines.items()},
     }
 
 
@@ -99,8 +97,8 @@ def make_dataset(
         if folder.is_dir() and not manifest.exists() and any(folder.iterdir()):
             raise DatasetError(f'{folder} holds other files: give another folder.')
         with closing(ResultFile(manifest, header)) as file:
-            for left in folder.glob('*/.*.partial'):  # by a process that was killed
-                _remove(left)
+            for left in [*folder.rglob('.*.partial')]:  # by a process that was killed
+                shutil.rmtree(left)
             there = {entry['part']: entry for entry in file.entries if _is_there(folder, entry)}
             missing = [[part] for part in parts_of(plan).items() if part[0] not in there]
             progress(sum(entry['windows'] for entry in there.values()), plan.windows)
@@ -111,17 +109,14 @@ def make_dataset(
                 file.add(there[entry['part']])
                 progress(sum(entry['windows'] for entry in there.values()), plan.windows)
         entries = [there[name] for name in parts_of(plan)]
-        template = package_files(__package__).joinpath('card.md.j2').read_text(encoding='utf-8')
-        card = Template(template, undefined=StrictUndefined)
-        text = card.render(plan=plan, header=header, parts=entries, unit_of=unit_of, table=LATHE)
-        (folder / CARD).write_text(text, encoding='utf-8')
+        facts = {'plan': plan, 'header': header, 'parts': entries}
+        card = rendered('dataset/card.md.j2', **facts, unit_of=unit_of, table=LATHE)
+        (folder / CARD).write_text(card, encoding='utf-8')
         in_order = [json.dumps(line) + '\n' for line in (header, *entries)]
         _write(manifest, {'.': ''.join(in_order).encode()})
     except OSError as error:
-        raise DatasetError(
-            f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there is '
-            'whole, and the same call goes on from it.'
-        ) from None
+        said = f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there'
+        raise DatasetError(f'{said} is whole, and the same call goes on from it.') from None
     return entries
 
 
@@ -132,25 +127,16 @@ def _is_there(folder: Path, entry: dict[str, Any]) -> bool:
 
 
 def _write(path: Path, files: Files) -> None:
-    """Write files under another name, and rename that when they are whole."""
-    unfinished = path.with_name(f'.{path.name}.partial')
-    try:
-        for name, content in files.items():
-            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
-            (unfinished / name).write_bytes(content)
+    """Write files elsewhere, and rename them when they are whole."""
+    path.parent.mkdir(exist_ok=True)
+    with TemporaryDirectory(dir=path.parent, prefix='.', suffix='.partial') as name:
+        part = Path(name) / 'part'
+        for file, content in files.items():
+            (part / file).parent.mkdir(parents=True, exist_ok=True)
+            (part / file).write_bytes(content)
         if path.is_dir():  # one that no line of the manifest speaks of
-            _remove(path)
-        unfinished.replace(path)
-    except OSError:
-        _remove(unfinished)
-        raise
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+            shutil.rmtree(path)
+        part.replace(path)
 
 
 def read_windows(folder: Path | str, split: str | None = None) -> Table:
@@ -166,5 +152,88 @@ def read_windows(folder: Path | str, split: str | None = None) -> Table:
     found = sorted(Path(folder).glob(f'{split or "*"}/part-*.*'))
     if not found:
         raise DatasetError(f'{folder} holds no windows{f" of {split}" if split else ""}.')
-    tables = [read_part(path) for path in found]
+    tables = [_read_part(path) for path in found]
     return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+
+
+def _files_of(plan: Plan, table: Table, runs: list[DrawnRun]) -> Files:
+    """A part in the form of the plan.
+
+    Raises:
+        MissingPackageError: If a library is missing that the form needs.
+    """
+    with TemporaryDirectory() as name:
+        part = Path(name) / 'part'
+        if plan.form is Form.PARQUET:
+            _write_parquet(part, table)
+        elif plan.form is Form.MCAP:
+            _write_runs(part, table, runs, plan.duration)
+        else:
+            with warnings.catch_warnings(), _arrays(part, plan.form, 'w') as arrays:
+                warnings.simplefilter('ignore')  # Zarr 3 has not settled on bytes yet
+                for column, values in table.items():  # words as bytes, as both hold them
+                    arrays[column] = values.astype('S') if values.dtype.kind == 'U' else values
+                for column in table:
+                    arrays[column].attrs['units'] = unit_of(column)
+        files = [part] if part.is_file() else sorted(f for f in part.rglob('*') if f.is_file())
+        return {file.relative_to(part).as_posix(): file.read_bytes() for file in files}
+
+
+def _write_parquet(path: Path, table: Table) -> None:
+    """A column each; signals are lists of a fixed length."""
+    arrow = optional('pyarrow', 'Parquet')
+    columns = {
+        name: arrow.FixedSizeListArray.from_arrays(values.ravel(), values.shape[1])
+        if values.ndim == 2
+        else arrow.array(values)
+        for name, values in table.items()
+    }
+    fields = [arrow.field(n, c.type, metadata={'unit': unit_of(n)}) for n, c in columns.items()]
+    rows = arrow.table(columns, schema=arrow.schema(fields))
+    # Noise does not compress: that would take as long as all else and save a hundredth.
+    plain = {'compression': 'none', 'use_dictionary': False, 'write_statistics': False}
+    optional('pyarrow.parquet', 'Parquet').write_table(rows, path, **plain)
+
+
+def _write_runs(folder: Path, table: Table, runs: list[DrawnRun], duration: float) -> None:
+    """Whole runs, as `lathe-chatter simulate` leaves them, and the truth of their windows."""
+    from lathe_chatter.scenario import Scenario, Step
+    from lathe_chatter.scenario.simulation import simulate
+
+    for run in runs:
+        rate, steps = run.config.setup.sample_rate, list[Step]()
+        for (_, before), (sample, after) in itertools.pairwise(run.cuts.items()):
+            new = dict(vars(after).items() - vars(before).items())
+            steps.append(Step(new, at=sample / rate))
+        name = f'machine_{run.machine:06}_run_{run.number:04}'
+        scenario = Scenario(name, name, duration, run.config.parameters(), tuple(steps))
+        knocks = [Knock(sample / rate, impulse) for sample, impulse in run.knocks.items()]
+        simulate(scenario, folder / name, knocks=knocks, monitor=False)
+    facts = {name: values.tolist() for name, values in table.items() if values.ndim == 1}
+    rows = (dict(zip(facts, row, strict=True)) for row in zip(*facts.values(), strict=True))
+    lines = [json.dumps(row) + '\n' for row in rows]
+    (folder / 'truth.jsonl').write_text(''.join(lines), encoding='utf-8')
+
+
+def _read_part(path: Path) -> Table:
+    """The windows of a part in Parquet, HDF5 or Zarr."""
+    if path.suffix == ENDINGS[Form.PARQUET]:
+        table = optional('pyarrow.parquet', 'Parquet').read_table(path)
+        columns = {name: table[name].combine_chunks() for name in table.column_names}
+        return {
+            name: column.flatten().to_numpy().reshape(len(column), -1)
+            if hasattr(column.type, 'list_size')
+            else column.to_numpy(zero_copy_only=False)
+            for name, column in columns.items()
+        }
+    form = Form.ZARR if path.suffix == ENDINGS[Form.ZARR] else Form.HDF5
+    with _arrays(path, form, 'r') as arrays:
+        table = {name: arrays[name][...] for name in arrays}
+    return {n: v.astype('U') if v.dtype.kind == 'S' else v for n, v in table.items()}
+
+
+def _arrays(path: Path, form: Form, mode: str) -> Any:
+    """The arrays of HDF5 or Zarr by name, which are read and written alike."""
+    if form is Form.ZARR:
+        return nullcontext(optional('zarr', 'Zarr').open_group(str(path), mode=mode))
+    return optional('h5py', 'HDF5').File(path, mode)

@@ -3,45 +3,31 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.dataset.drawn_value import Distribution
-from lathe_chatter.dataset.plan import OF_FILE, Plan
+from lathe_chatter.dataset.plan import OF_FILE, Drawn, Plan
 from lathe_chatter.lathe import EventKind
 from lathe_chatter.lathe.config import LatheConfig, config_from
 from lathe_chatter.model import Cut
-from lathe_chatter.model.lathe_parameter_table import LATHE, MACHINE_FILE
+from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.model.uncertainty import uncertainty_from
-from lathe_chatter.samples import sample_columns
 from lathe_chatter.samples.columns import ACCELERATION_COLUMNS, UNITS
 from lathe_chatter.stability import safe_limit
-from lathe_chatter.stability.characteristic import Complex
-from lathe_chatter.stability.stability_of_many_cuts import operating_points
+from lathe_chatter.stability.stability_of_many_cuts import OperatingPoints, operating_points
 
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""
-_UNITS = {
-    'start': 's',
-    'growth_rate': '1/s',
-    'frequency': 'Hz',
-    'seconds_since_onset': 's',
-} | UNITS
+_TRUTH = {'start': 's', 'growth_rate': '1/s', 'frequency': 'Hz', 'seconds_since_onset': 's'}
+_UNITS = UNITS | _TRUTH
 _REGIMES = np.array(['free', 'rattling', 'seated'])
-_CONTACTS = {
-    EventKind.BEARING_ENGAGES: (0, True),
-    EventKind.BEARING_RELEASES: (0, False),
-    EventKind.TOOL_LEAVES_CUT: (1, True),
-    EventKind.TOOL_ENTERS_CUT: (1, False),
-}
+_ON_BEARING = {EventKind.BEARING_ENGAGES: True, EventKind.BEARING_RELEASES: False}
+_OUT_OF_CUT = {EventKind.TOOL_LEAVES_CUT: True, EventKind.TOOL_ENTERS_CUT: False}
 _RAMP = 20
 """Steps in which a value that takes its time changes."""
-_DEEPEST = limits_of(Cut, 'depth_of_cut').high
 _OF_MACHINE, _OF_RUN = 0, 1
 
 
@@ -65,12 +51,8 @@ def drawn_machine(plan: Plan, number: int) -> LatheConfig:
     """The machine of a number, which is the same in whatever order they are drawn."""
     rng = np.random.default_rng([plan.seed, _OF_MACHINE, number])
     values = {name: how.draw(rng) for name, how in plan.machine.items()}
-    if MACHINE_FILE.name in values:
-        values[MACHINE_FILE.name] = plan.files[values[MACHINE_FILE.name]]
     config = config_from({**values, 'sample_rate': plan.sample_rate, 'spindle_acceleration': 0.0})
-    if not plan.errors:
-        return config
-    file = config.described.uncertainty if config.described and plan.errors == OF_FILE else None
+    file = config.description.uncertainty if plan.errors == OF_FILE else None
     known = file or uncertainty_from(plan.errors, config.machine)
     ((machine,), _) = known.draw(config.machine, 1, int(rng.integers(2**31)))
     return replace(config, setup=replace(config.setup, machine=machine))
@@ -96,60 +78,54 @@ def drawn_run(plan: Plan, machine: int, config: LatheConfig, number: int) -> Dra
         if after != cut:
             cuts[round((at + event.over) * plan.sample_rate)] = after
         cut = after
-    return DrawnRun(machine, number, config, dict(sorted(cuts.items())), knocks)
+    cuts = {sample: cuts[sample] for sample in sorted(cuts) if sample < plan.samples}
+    knocks = {sample: knock for sample, knock in knocks.items() if sample < plan.samples}
+    return DrawnRun(machine, number, config, cuts, knocks)
 
 
-def _changed(
-    config: LatheConfig, cut: Cut, changes: Mapping[str, Distribution], rng: np.random.Generator
-) -> Cut:
+def _changed(config: LatheConfig, cut: Cut, changes: Drawn, rng: np.random.Generator) -> Cut:
     """A cut with values drawn; a depth that is a multiple of the safe one comes last."""
     found = {name: how.draw(rng) for name, how in changes.items()}
     if 'depth_of_cut' in found and changes['depth_of_cut'].of_limit:
         factor, leaves = found.pop('depth_of_cut'), config.setup.tool_leaves_cut
         cut = cut.with_changes(**found)
         limit = safe_limit(config.machine, cut, tool_leaves_cut=leaves).depth_of_cut
-        found = {'depth_of_cut': min(factor * float(limit), _DEEPEST)}
+        found = {'depth_of_cut': min(factor * float(limit), limits_of(Cut, 'depth_of_cut').high)}
     return cut.with_changes(**found)
 
 
-def windows_of(plan: Plan, machines: Mapping[int, LatheConfig]) -> tuple[Table, list[DrawnRun]]:
+def windows_of(plan: Plan, machines: dict[int, LatheConfig]) -> tuple[Table, list[DrawnRun]]:
     """The windows of some machines, and the runs that they are cut from."""
     numbers = itertools.product(machines.items(), range(plan.runs))
     runs = [drawn_run(plan, *machine, number) for machine, number in numbers]
     setups = [run.config.setup for run in runs for _ in run.cuts]
-    points = operating_points(
-        [setup.machine for setup in setups],
-        [cut for run in runs for cut in run.cuts.values()],
-        tool_leaves_cut=[setup.tool_leaves_cut for setup in setups],
-    )
+    cuts = [cut for run in runs for cut in run.cuts.values()]
+    leaves = [setup.tool_leaves_cut for setup in setups]
+    points = operating_points([setup.machine for setup in setups], cuts, tool_leaves_cut=leaves)
     ends = np.cumsum([len(run.cuts) for run in runs])[:-1]
-    parts = zip(runs, np.split(points.root, ends), np.split(points.stable, ends), strict=True)
-    tables = [_windows(plan, *part) for part in parts]
+    parts = zip(runs, *(np.split(each, ends) for each in points), strict=True)
+    tables = [_windows(plan, run, OperatingPoints(*own)) for run, *own in parts]
     return {name: np.concatenate([t[name] for t in tables]) for name in tables[0]}, runs
 
 
-def _windows(plan: Plan, run: DrawnRun, roots: Complex, stable: NDArray[np.bool_]) -> Table:
+def _windows(plan: Plan, run: DrawnRun, points: OperatingPoints) -> Table:
     """The windows of a run, with the truth of each of its cuts."""
     samples, contacts = _simulated(plan, run)
-    starts = np.array([s for s in plan.starts if s + plan.length <= len(samples)], np.int64)
-    names = sample_columns(accelerometers=run.config.setup.accelerometers)
-    signals = {
-        name: samples[starts[:, None] + np.arange(plan.length), names.index(name)].astype('f4')
-        for name in plan.columns
-    }
+    last = len(samples['time']) - plan.length
+    starts = np.array([start for start in plan.starts if start <= last], np.int64)
+    inside = starts[:, None] + np.arange(plan.length)
+    signals = {name: samples[name][inside].astype('f4') for name in plan.columns}
     changes, ends, rate = np.array([*run.cuts]), starts + plan.length, plan.sample_rate
     now = np.searchsorted(changes, ends - 1, side='right') - 1
     # The change that made it unstable: the first after the last stable cut.
-    calm = np.maximum.accumulate(np.where(stable, np.arange(len(stable)), -1))
-    onset = np.where(stable, np.nan, changes[np.minimum(calm + 1, len(changes) - 1)])
+    calm = np.maximum.accumulate(np.where(points.stable, np.arange(len(changes)), -1))
+    onset = np.where(points.stable, np.nan, changes[np.minimum(calm + 1, len(changes) - 1)])
     # Time spent on the bearing and out of the cut, at the ends of each window, as a share of it.
     times, lasted = contacts[:, 0], np.diff(contacts[:, 0])
     spent = [np.concatenate(([0.0], np.cumsum(lasted * s))) for s in contacts[:-1, 1:].T]
     edges = np.array([starts, ends]) / rate
-    on_bearing, out_of_cut = (
-        np.round(np.diff(np.interp(edges, times, total), axis=0)[0] * rate / plan.length, 9)
-        for total in spent
-    )
+    within = [np.diff(np.interp(edges, times, total), axis=0)[0] for total in spent]
+    on_bearing, out_of_cut = np.round(np.array(within) * rate / plan.length, 9)
     drawn = [LatheConfig(run.config.setup, cut).parameters() for cut in run.cuts.values()]
     values = {name: np.array([each[name] for each in drawn])[now] for name in plan.drawn}
     facts = {  # card.md.j2 says what they are
@@ -157,9 +133,9 @@ def _windows(plan: Plan, run: DrawnRun, roots: Complex, stable: NDArray[np.bool_
         'run': run.number,
         'seed': run.config.setup.seed,
         'start': starts / rate,
-        'growth_rate': roots.real[now],
-        'frequency': roots.imag[now] / (2.0 * np.pi),
-        'stable': stable[now],
+        'growth_rate': points.root.real[now],
+        'frequency': points.root.imag[now] / (2.0 * np.pi),
+        'stable': points.stable[now],
         'regime': _REGIMES[(on_bearing > 0.0).astype(int) + (on_bearing >= 1.0)],
         'share_out_of_cut': out_of_cut,
         'share_on_bearing': on_bearing,
@@ -168,16 +144,15 @@ def _windows(plan: Plan, run: DrawnRun, roots: Complex, stable: NDArray[np.bool_
     return {n: np.resize(v, len(starts)) for n, v in facts.items()} | signals | values
 
 
-def _simulated(plan: Plan, run: DrawnRun) -> tuple[Array, Array]:
+def _simulated(plan: Plan, run: DrawnRun) -> tuple[Table, Array]:
     """The samples of a run, and its contacts.
 
     Returns:
-        Samples (n, columns), and rows of time, s, whether the workpiece touches its bearing from
+        Samples by column (n,), and rows of time, s, whether the workpiece touches its bearing from
         then on, and whether the tool is out of the cut (m, 3).
     """
     lathe, blocks, contacts = run.config.lathe(), [], []
-    inside = {k for k in (*run.cuts, *run.knocks) if k < plan.samples}
-    for here, stop in itertools.pairwise(sorted({0, *inside, plan.samples})):
+    for here, stop in itertools.pairwise(sorted({*run.cuts, *run.knocks, plan.samples})):
         lathe.retune(run.cuts.get(here, lathe.cut))
         if here in run.knocks:
             lathe.knock(run.knocks[here])
@@ -185,6 +160,7 @@ def _simulated(plan: Plan, run: DrawnRun) -> tuple[Array, Array]:
         contacts.append((lathe.time, *now))
         blocks.append(lathe.advance(stop - here))
         for time, kind in lathe.events:
-            place, now[place] = _CONTACTS[kind]
+            now = [_ON_BEARING.get(kind, now[0]), _OUT_OF_CUT.get(kind, now[1])]
             contacts.append((time, *now))
-    return np.concatenate(blocks), np.array([*contacts, (plan.duration + 1.0, False, False)])
+    samples = dict(zip(lathe.columns, np.concatenate(blocks).T, strict=True))
+    return samples, np.array([*contacts, (plan.duration + 1.0, False, False)])

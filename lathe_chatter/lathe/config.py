@@ -40,6 +40,11 @@ class LatheConfig:
         """Tool, workpiece, bearing and material."""
         return self.setup.machine
 
+    @property
+    def description(self) -> MachineDescription:
+        """The machine as a machine file has it."""
+        return replace(self.described or MachineDescription(), machine=self.machine)
+
     def lathe(self) -> VirtualLathe:
         """A lathe that is started like this."""
         values = {entry.name: getattr(self.setup, entry.name) for entry in fields(LatheSetup)}
@@ -49,7 +54,7 @@ class LatheConfig:
         """Every parameter by its name, as `config_from` takes them."""
         found = parameters_of(self)
         if self.described is not None:
-            found[MACHINE_FILE.name] = replace(self.described, machine=self.machine).text()
+            found[MACHINE_FILE.name] = self.description.text()
         return found
 
 

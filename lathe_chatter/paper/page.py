@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from lathe_chatter.paper.open_questions import Findings, StiffnessEffect, Window
 from lathe_chatter.paper.published_runs import PAPER_RUNS, run_named
 from lathe_chatter.paper.reproduced_run import AGREEMENT, Reproduced
 from lathe_chatter.paper.screening_function_variants import Reading
+from lathe_chatter.shipped_files import rendered
 
 OVERVIEWS = (
     Picture('growth', 'Growth in time', 'Each run against the slope that its root gives it.'),
@@ -23,7 +23,7 @@ OVERVIEWS = (
 PAGE = 'index.html'
 _FAST = 10000.0
 """rev/min of the run whose axes tell two readings apart."""
-_TEMPLATE = 'page.html.j2'
+_TEMPLATE = 'paper/page.html.j2'
 _MEANINGS = {
     Reading.NONE: 'never 1: the bearing is never touched',
     Reading.GAP: 'equation (9) as printed: 1 while x_wp ≥ clearance',
@@ -49,7 +49,6 @@ def write_page(
     Returns:
         The path of the page.
     """
-    from jinja2 import Environment, StrictUndefined
 
     def shown(wanted: Sequence[Picture]) -> list[dict[str, str]]:
         return [
@@ -60,9 +59,8 @@ def write_page(
 
     with_bearing = sum(run.has_bearing for run in PAPER_RUNS)
     whole = [r for r in findings.screening if r.verdicts == len(PAPER_RUNS)]
-    source = files('lathe_chatter.paper').joinpath(_TEMPLATE).read_text(encoding='utf-8')
-    environment = Environment(autoescape=True, undefined=StrictUndefined)
-    text = environment.from_string(source).render(
+    text = rendered(
+        _TEMPLATE,
         results=results,
         agreement=AGREEMENT,
         findings=findings,
