@@ -30,7 +30,7 @@ from lathe_chatter.errors import WorkerError
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
-_AHEAD, _PER_WORKER = 2, 4
+_AHEAD, _PER_WORKER = 2, 8
 """Batches that are out at once, and batches in all, for each worker."""
 RETRIES = 3
 

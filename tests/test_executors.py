@@ -19,7 +19,7 @@ import pytest
 from lathe_chatter import executors
 from lathe_chatter.cli.worker_options import open_executor
 from lathe_chatter.errors import ParameterError, WorkerError
-from lathe_chatter.executors import Processes, run_batches, spread, width_of
+from lathe_chatter.executors import Processes, batches_of, run_batches, spread, width_of
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.many_lathes import LatheSweep
 from lathe_chatter.model import Cut, Machine
@@ -141,6 +141,14 @@ def test_where_processors_differ_that_is_said(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(executors, 'processor_name', lambda: next(names))
     with pytest.warns(UserWarning, match='between the processors A, B'):
         spread(square, [1, 2])
+
+
+def test_a_lost_worker_loses_little() -> None:
+    """What it had in hand is an eighth of its share, in whatever number of items."""
+    with ThreadPoolExecutor(2) as pool:
+        batches = batches_of(range(1600), pool)
+    assert max(map(len, batches)) == 100
+    assert [item for batch in batches for item in batch] == list(range(1600))
 
 
 def test_no_more_is_begun_than_keeps_the_workers_busy() -> None:

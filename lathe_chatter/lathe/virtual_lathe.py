@@ -262,19 +262,29 @@ class VirtualLathe:
 
     # -- how ------------------------------------------------------------------------------
 
-    def _begin(self, state: LatheState) -> None:
-        """Take over a state."""
+    def __getstate__(self) -> tuple[LatheState, Array, list[Array]]:
+        """As another process gets it: without room for more, with constants that are dear."""
+        return self._state.copy(), self._flat, self._found
+
+    def __setstate__(self, sent: tuple[LatheState, Array, list[Array]]) -> None:
+        """Go on as that lathe would."""
+        state, flat, found = sent
+        self._begin(state, surface.aligned_copy(flat))
+        self._found = found
+
+    def _begin(self, state: LatheState, constants: Array | None = None) -> None:
+        """Take over a state, with the constants of the inner loop where they are known."""
         state.numbers = surface.aligned_copy(state.numbers)
         state.nodes = surface.with_room(state.nodes, state.nodes.shape[1] + _ROOM)
         self._state = state
         self._event_space = np.empty((64, 3))
         self._found = []
-        self._prepare()
+        self._prepare(constants)
 
-    def _prepare(self) -> None:
+    def _prepare(self, constants: Array | None = None) -> None:
         """Turn machine and cut into the constants of the inner loop."""
         modes = len(self._state.numbers) - layout.NUMBERS_SIZE >> 2
-        self._flat = self._state.constants.flat
+        self._flat = self._state.constants.flat if constants is None else constants
         self._columns = len(self.columns)
         self._room = stepper.room_for(modes)
 

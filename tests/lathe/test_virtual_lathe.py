@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 import signal
 import subprocess
 import sys
@@ -85,6 +86,22 @@ def test_a_restored_lathe_goes_on_bit_for_bit(settings: dict[str, Any], when: in
         assert machine.samples_taken == when
         assert machine.advance(400).tobytes() == expected.tobytes()
         assert machine.snapshot() == end
+
+
+@_ALL_SETTINGS
+def test_a_lathe_goes_to_another_process_small_and_goes_on_there(settings: dict[str, Any]) -> None:
+    """With its events, and without the room that it keeps for more surface."""
+    lathe = VirtualLathe(**settings)
+    lathe.advance(3000)
+    sent = pickle.dumps(lathe)
+    state = lathe.snapshot()
+    needed = len(pickle.dumps(state)) + state.constants.flat.nbytes + 24 * len(lathe.events)
+    assert len(sent) < needed + 8000
+    there = pickle.loads(sent)  # noqa: S301 -- ours
+    assert there.events == lathe.events
+    assert there.snapshot() == state
+    assert there.advance(3000).tobytes() == lathe.advance(3000).tobytes()
+    assert there.snapshot() == lathe.snapshot()
 
 
 def test_a_snapshot_is_a_value_of_its_own() -> None:
