@@ -103,7 +103,7 @@ SENTENCES = {
     ),
     'clearance': Sentence(
         'info',
-        _AT + r'the chatter has died out(; the cut is \w+)?\.',
+        _AT + r'the chatter has died out(; [a-z ]+)?\.',
         'the vibration of this same run died down, or the spindle stands, or nothing is cut',
     ),
     'withdrawn': Sentence(
@@ -139,9 +139,15 @@ def details(estimate: Estimate) -> dict[str, object]:
 
 def onset(estimate: Estimate) -> str:
     """What a machinist has to know, as far as it is known."""
+    growth, error = estimate.growth_rate, estimate.growth_rate_error
+    grows = (
+        f'growing at {growth:.1f}'
+        if growth > error
+        else f'growth rate {growth:.1f} +- {error:.1f}'
+    )
     known = [
         (estimate.frequency, f'at {estimate.frequency:.1f} Hz'),
-        (estimate.growth_rate, f'growing at {estimate.growth_rate:.1f} 1/s'),
+        (growth, f'{grows} 1/s'),
         (estimate.amplitude, f'amplitude {estimate.amplitude * 1e6:.3g} um'),
     ]
     words = [text for value, text in known if math.isfinite(value)]
@@ -149,10 +155,19 @@ def onset(estimate: Estimate) -> str:
     return f'At {estimate.time:.6f} s: chatter {", ".join(words) or "flagged"}.'
 
 
+_AFTER_CHATTER = {
+    'stable': '; the cut is stable',
+    'watch': '; what is left is still watched',
+    'forced': '; what is left is the vibration of the spindle itself',
+    'idle': '; nothing is cut',
+}
+"""How a state goes on in the sentence that chatter is over; of others there is nothing to say."""
+
+
 def clearance(estimate: Estimate) -> str:
     """That it is over."""
-    cut = '' if estimate.state == 'unknown' else f'; the cut is {estimate.state}'
-    return f'At {estimate.time:.6f} s: the chatter has died out{cut}.'
+    rest = _AFTER_CHATTER.get(estimate.state, '')
+    return f'At {estimate.time:.6f} s: the chatter has died out{rest}.'
 
 
 def withdrawn(at: float) -> str:

@@ -16,12 +16,12 @@ from support.node_bench import LATCHED, Bench
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import Estimate
-from lathe_chatter.detection.estimate import Mode
+from lathe_chatter.detection.estimate import STATES, Mode
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
-from lathe_chatter.nodes.monitor_sentences import SENTENCES
+from lathe_chatter.nodes.monitor_sentences import SENTENCES, clearance, onset
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
 
@@ -247,6 +247,32 @@ def test_each_sentence_is_said_when_it_is_true_and_no_other(
 def test_every_sentence_has_a_story_and_says_when_it_is_true() -> None:
     assert STORIES.keys() == SENTENCES.keys()
     assert all(sentence.true_when for sentence in SENTENCES.values())
+
+
+@pytest.mark.parametrize(
+    ('growth', 'words'),
+    [(4.0, 'growing at 4.0 1/s'), (1.0, 'growth rate 1.0 +- 1.5 1/s'),
+     (-4.0, 'growth rate -4.0 +- 1.5 1/s')],
+)  # fmt: skip
+def test_only_what_surely_grows_is_said_to_grow(growth: float, words: str) -> None:
+    estimate = Estimate(
+        1.0, 'chatter', chatter=True, growth_rate=growth, growth_rate_error=1.5, amplitude=1e-6
+    )
+    assert onset(estimate) == f'At 1.000000 s: chatter {words}, amplitude 1 um.'
+
+
+def test_that_chatter_is_over_reads_well_whatever_the_state() -> None:
+    said = {state: clearance(Estimate(1.0, state)) for state in STATES}
+    over = 'At 1.000000 s: the chatter has died out'
+    assert said == {
+        'stable': f'{over}; the cut is stable.',
+        'watch': f'{over}; what is left is still watched.',
+        'forced': f'{over}; what is left is the vibration of the spindle itself.',
+        'idle': f'{over}; nothing is cut.',
+        'unknown': f'{over}.',
+        'chatter': f'{over}.',
+    }
+    assert all(re.fullmatch(SENTENCES['clearance'].pattern, each) for each in said.values())
 
 
 def test_a_space_after_the_comma_of_a_label_is_no_part_of_a_name(
