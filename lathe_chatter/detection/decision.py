@@ -389,4 +389,4 @@ def judge(
     write_figures(state, windows, wave, model, amplitude)
     now.shown_amplitude = shown_amplitude(now, products, settings, omega, speed)
     cutting = is_cutting(now, windows[WINDOWS.size - 1], products, settings)
-    now.state = state_of(state, cutting, forced)
+    now.state = state_of(state, settings, cutting, forced)

@@ -9,7 +9,7 @@ from typing import Any
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection.decision import SMALLEST_GROWTH
-from lathe_chatter.detection.detector_state import UNKNOWN
+from lathe_chatter.detection.detector_state import SERIOUSNESS, STABLE, UNKNOWN
 from lathe_chatter.detection.estimate import STATES, Estimate, Mode
 from lathe_chatter.detection.filter_design import (
     HIGHEST_SEEN,
@@ -111,7 +111,7 @@ class ChatterDetector:
         self._prepared: tuple[float, Mode] | None = None
         self._judges: list[BandDetector] = []
         self._lines: SteadyToneAlarm | None = None
-        self._speaker = 0
+        self._speaker, self._known = 0, False
 
     def update(self, samples: Array, columns: Sequence[str]) -> Estimate:
         """Take in samples.
@@ -134,6 +134,7 @@ class ChatterDetector:
             elif item is Discontinuity.RESTART:
                 self._forget()
             else:
+                self._known = False
                 for judge in self._judges:
                     judge.start_stretch()
                 if not self._estimate.chatter:
@@ -206,7 +207,7 @@ class ChatterDetector:
                 self._advisers.append(SpeedAdviser(self._machine, self._speed_range))
             age = ADVISED_LONG_AGO if self._advised else TO_BE_ADVISED
             alarm_age = age if self._estimate.chatter else None
-            self._speaker, self._advised = 0, True
+            self._speaker, self._advised, self._known = 0, True, False
             self._judges = [
                 BandDetector(self._machine, band, form, self._thresholds, adviser, alarm_age)
                 for band, adviser in zip(bands, self._advisers, strict=False)
@@ -249,7 +250,7 @@ class ChatterDetector:
             if self._lines is not None:
                 self._lines.look()
         if len(self._judges) > 1:
-            self._speaker = max(range(len(self._judges)), key=lambda k: self._judges[k].weight)
+            self._speaker = self._most_serious()
         correction = self._judges[0].correction
         machine = self._machine
         if correction is None or machine is None or isinstance(machine.tool, Structure):
@@ -260,6 +261,14 @@ class ChatterDetector:
         self._machine = replace(machine, tool=tool)
         self._estimate = self._new_estimate(time)
         self._begin_with_machine()
+
+    def _most_serious(self) -> int:
+        weights = [judge.weight for judge in self._judges]
+        serious, loudest = max(weights), max(weights, key=lambda weight: weight[1])
+        # A quick band knows soon that it is stable; what is loud elsewhere may yet be chatter.
+        self._known = self._known or loudest[0] > SERIOUSNESS[UNKNOWN]
+        speaks = self._known or serious[0] > SERIOUSNESS[STABLE]
+        return weights.index(serious if speaks else loudest)
 
     def _machine_in_words(self, judge: BandDetector) -> str:
         """Whether the machine that was told is believed; empty where it is."""

@@ -24,6 +24,9 @@ from lathe_chatter.detection.signal_conditioning import mean_kept
 from lathe_chatter.detection.structured_arrays import Records
 
 _WATCH = 0.75
+_KNOWN, _LINE_KNOWN = HOPS + 32, 1.75
+"""Hops after which a cut may be called stable, and, without a machine, times over which the power
+of a line is averaged: chatter that grew before anybody listened is flagged by then."""
 _ONSET = 8
 """Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
 _CUTS, _PUSHED = 4.0, 32
@@ -68,7 +71,7 @@ def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
 
 
 @compiled(borrows=True, inner=True)
-def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
+def state_of(state: DetectorState, settings: Any, cutting: bool, forced: bool) -> int:
     """Which of `estimate.STATES`, by its number."""
     now = state.now[0]
     if now.alarmed != 0:
@@ -81,7 +84,10 @@ def state_of(state: DetectorState, cutting: bool, forced: bool) -> int:
         return WATCH
     if forced:
         return FORCED
-    return STABLE
+    known = now.hops_seen >= _KNOWN
+    if settings.has_machine == 0:
+        known = known and now.hops_seen * state.line_shares[0] > _LINE_KNOWN
+    return STABLE if known else UNKNOWN
 
 
 @compiled(borrows=True, inner=True)
