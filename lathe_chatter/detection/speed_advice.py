@@ -31,6 +31,9 @@ _AROUND, _TRIED = 0.15, 61
 """Part of a speed by which others around it are tried, and how many are."""
 _WIDE, _AS_GOOD = 0.04, 0.8
 """Width that an ordinary spindle can keep to; part of the damping that the middle must have."""
+_KEPT = 0.7
+"""Part of the damping, and of the width, of the best speed with which the one that was said before
+is kept to."""
 _RULE_MOST = 3
 """Waves a turn up to which the rule of thumb is tried: of more, fewer were stable than it says."""
 
@@ -138,6 +141,7 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
     *,
     seated: bool | None = None,
     cutting_error: float = 0.0,
+    said_rpm: float = math.nan,
 ) -> Advice:
     """Speeds at which the cut is well damped whether or not the bearing carries.
 
@@ -153,6 +157,8 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
         seated: Whether the bearing carries throughout, or not at all; None where it does now
             and then, or nobody knows.
         cutting_error: Standard error of C w, N/m.
+        said_rpm: The speed that was recommended before, from an estimate that was less sure; it
+            comes first unless another is clearly better. nan for none.
     """
     if not cutting_stiffness > 0.0:
         return Advice()
@@ -185,7 +191,8 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
             found.insert(0, first)
         speeds = [speed for _, speed in found[:_MOST]]
         near_ones = [speed for _, speed in damped[:_MOST]] or speeds[:1]
-        speeds[0] = _wide_enough(machine, depth, near_ones, speed_range, contacts)
+        best = _wide_enough(machine, depth, near_ones, speed_range, contacts)
+        speeds[0] = _kept(machine, depth, said_rpm, best, speed_range, contacts)
         return Advice(tuple(speeds), 1.0, current_rpm)
     contacts = both if seated is None else (seated,)
     return _less_depth(machine, depth, speed_range, contacts, cutting_error / cutting_stiffness)
@@ -206,6 +213,26 @@ def _wide_enough(
         other = _centred(machine, depth, speed, speed_range, contacts)
         best = max(best, other, key=lambda each: each.width)
     return best
+
+
+def _kept(  # noqa: PLR0913, PLR0917 -- what is known of a cut
+    machine: Machine,
+    depth: float,
+    said_rpm: float,
+    best: AdvisedSpeed,
+    speed_range: tuple[float, float],
+    contacts: tuple[bool, ...],
+) -> AdvisedSpeed:
+    """The middle of the lobe that was recommended before, unless the best is clearly better."""
+    if not speed_range[0] <= said_rpm <= speed_range[1]:
+        return best
+    roots = [rightmost_root(machine, said_rpm, depth, seated=contact) for contact in contacts]
+    said = AdvisedSpeed(said_rpm, max(root.real for root in roots))
+    if not said.growth_rate < 0.0:
+        return best
+    said = _centred(machine, depth, said, speed_range, contacts)
+    damped = said.growth_rate < _KEPT * best.growth_rate
+    return said if damped and said.width > _KEPT * min(best.width, _WIDE) else best
 
 
 def _centred(

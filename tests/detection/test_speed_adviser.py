@@ -9,9 +9,14 @@ import pytest
 from support.machines import random_machine
 
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
-from lathe_chatter.detection.speed_adviser import SPEEDS, AdviceRequest, Identified
+from lathe_chatter.detection.speed_adviser import (
+    SPEEDS,
+    AdviceRequest,
+    Identified,
+    SpeedAdviser,
+)
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model import Cut, Machine, Mode
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import critical_depth, rightmost_root
 
@@ -174,3 +179,27 @@ def test_the_rule_of_thumb_stays_in_reach_of_a_spindle_of_which_nothing_is_known
     said = AdviceRequest(known, None, speeds).answer.in_words()
     assert said.startswith(words)
     assert bool(said) is bool(words)
+
+
+def test_advice_keeps_to_what_it_said_unless_another_speed_is_clearly_better() -> None:
+    """At nearly one depth two lobes are as good; found anew, each would be recommended in turn."""
+    turn = 2.0 * math.pi
+    shop = Machine(
+        Mode(2.0, turn * 300.0, 0.03), Mode(20.0, turn * 120.0, 0.03), 0.0,
+        cutting_coefficient=1.5e9,
+    )  # fmt: skip
+    adviser = SpeedAdviser(shop, (200.0, 4000.0))
+    said, alone = [], []
+    for hop, depth in enumerate([0.35e-3, 0.37e-3, 0.35e-3, 0.37e-3, 0.46e-3]):
+        error = 1.0 - 0.1 * hop
+        known = Identified(3.0, error, 313.0, 1200.0, 1.5e9 * depth, shop.workpiece.stiffness)
+        adviser.consider(known, hop, modelled=True)
+        assert adviser.request is not None
+        said.append(adviser.request.answer.speeds[0].spindle_speed_rpm)
+        fresh = AdviceRequest(known, shop, (200.0, 4000.0))
+        alone.append(fresh.answer.speeds[0].spindle_speed_rpm)
+        assert _growth(shop, said[-1], depth) < 0.0
+    near, better = alone[0], alone[-1]
+    assert better > 1.1 * near
+    assert [each > 1.1 * near for each in alone] == [False, True, False, True, True]
+    assert [each > 1.1 * near for each in said] == [False, False, False, False, True]
