@@ -293,10 +293,10 @@ class ChatterDetector:
             mode = self._without
         if words:
             mode = Mode.CORRECTED if judge.believed else Mode.MISFIT
-        stiffness = math.nan if self._lone else now['stiffness']
+        bearing = self._machine.bearing_stiffness if self._machine is not None else 0.0
+        stiffness = now['stiffness'] if bearing else math.nan
         engaged = None
         if self._machine is not None and math.isfinite(stiffness):
-            bearing = self._machine.bearing_stiffness
             engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
         if self._mixed:  # neither metres nor a growth rate that is one body's
             now |= dict.fromkeys(('growth', 'growth_error', 'shown_amplitude'), math.nan)

@@ -91,7 +91,7 @@ class Estimate:
         spindle_speed_rpm: rev/min.
         cutting_stiffness: C w, N/m.
         workpiece_stiffness: What carries the workpiece: k_wp, up to k_wp + k_bc, N/m; nan where
-            only one body gives.
+            only one body gives, or there is no bearing.
         bearing_engaged: Whether the workpiece rests on its bearing, at least in part.
         once_per_turn: Variance at one spindle angle from turn to turn, over all variance: near
             1 for chatter, near 0 for vibration that is the spindle's own.

@@ -170,7 +170,7 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
     depth = cutting_stiffness / coefficient
     low, high = speed_range
     near = max(low, current_rpm / _NEAR), min(high, current_rpm * _NEAR)
-    both = (False, True)
+    both = (False, True) if machine.bearing_stiffness else (False,)
     regimes = (both,) if seated is None else (both, (seated,))
     found: list[tuple[float, AdvisedSpeed]] = []
     for contacts in regimes:

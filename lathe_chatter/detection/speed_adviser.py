@@ -204,8 +204,10 @@ class SpeedAdviser:
 
 def _seated(machine: Machine, stiffness: float) -> bool | None:
     """Whether the bearing carries throughout, or not at all; None in between."""
+    if not machine.bearing_stiffness:
+        return False
     open_ = machine.workpiece_stiffness(seated=False)
-    part = (stiffness - open_) / max(machine.bearing_stiffness, 1e-9 * open_)
+    part = (stiffness - open_) / machine.bearing_stiffness
     if abs(part) < _CLEAR_CONTACT:
         return False
     return True if abs(part - 1.0) < _CLEAR_CONTACT else None

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import Any, Protocol, TypeVar
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.model.cut import Cut
+from lathe_chatter.model.cut import BearingContact, Cut
 from lathe_chatter.model.machine import Body, Machine, Structure
 from lathe_chatter.model.machine_and_sampling import SEED, LatheSetup
 from lathe_chatter.model.machine_file import MachineDescription, load_machine
@@ -58,6 +58,20 @@ def machine_from(values: Mapping[str, Any]) -> Machine:
             allowed = f'left to the machine file, in which the {part} has several modes'
             raise ParameterError(row.name, values[row.name], row.unit, allowed)
     return _made_like(described.machine, values, complete=True)
+
+
+def machine_in_cut(values: Mapping[str, Any]) -> Machine:
+    """The same as a detector may identify it: without the bearing that a machine file has not.
+
+    Raises:
+        ParameterError: As `machine_from`.
+        MachineFileError: As `machine_from`.
+    """
+    machine, described = machine_from(values), described_by(values)
+    if described is None or described.cut.bearing_contact is not BearingContact.NONE:
+        return machine
+    contact = values.get('bearing_contact', BearingContact.NONE)
+    return machine if contact != BearingContact.NONE else replace(machine, bearing_stiffness=0.0)
 
 
 def setup_from(values: Mapping[str, Any]) -> LatheSetup:

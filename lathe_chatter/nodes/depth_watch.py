@@ -1,4 +1,4 @@
-"""The depth of cut that a lathe says it has, followed while it cuts."""
+"""What a lathe says of its cut while it cuts: the depth, and how its bearing carries."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
 
-from lathe_chatter.nodes.remote_parameters import RemoteParameters
+from lathe_chatter.nodes.remote_parameters import CONTACT, RemoteParameters
 
 _DEPTH = 'depth_of_cut'
 
@@ -24,11 +24,14 @@ class DepthWatch:
         node: That wants to know; the lathe is the node `lathe` beside it, remappable like its
             topics.
         on_change: Called with the new depth over the one of before; nan where that is not known.
+        on_contact: Called when the contact of the bearing is another.
     """
 
-    def __init__(self, node: Node, on_change: Callable[[float], None]) -> None:
+    def __init__(
+        self, node: Node, on_change: Callable[[float], None], on_contact: Callable[[], None]
+    ) -> None:
         """Nothing is known yet."""
-        self._on_change = on_change
+        self._on_change, self._on_contact = on_change, on_contact
         self._depth = math.nan
         self._parameters = RemoteParameters(node, self._take)
         service = node.resolve_service_name('lathe/get_parameters')
@@ -59,3 +62,5 @@ class DepthWatch:
                 before, self._depth = self._depth, float(parameter_value_to_python(entry.value))
                 if before != self._depth:
                     self._on_change(self._depth / before if before > 0.0 else math.nan)
+            elif entry.name == CONTACT:
+                self._on_contact()

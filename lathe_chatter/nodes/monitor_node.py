@@ -18,7 +18,7 @@ from lathe_chatter.detection import Advice, ChatterDetector, Estimate
 from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
-from lathe_chatter.model.lathe_parameter_table import machine_from
+from lathe_chatter.model.lathe_parameter_table import machine_in_cut
 from lathe_chatter.model.machine_file import MachineDescription, narrowed
 from lathe_chatter.nodes.depth_watch import DepthWatch
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
@@ -86,13 +86,13 @@ class MonitorNode(ParameterNode):
         source = ModelSource(self.values['model'])
         self.machine: Machine | None = None
         if source is ModelSource.PARAMETERS:
-            self.machine = machine_from(self.values)
+            self.machine = machine_in_cut(self.values)
         self._asked: RemoteMachine | None = None
         if source is ModelSource.LATHE:
             self._asked = RemoteMachine(self, self._learn)
         self._speed_range = self._own_speeds()
         self._detector = self._new_detector()
-        self._depth = DepthWatch(self, lambda factor: self._detector.follow_depth(factor))  # noqa: PLW0108 -- of then
+        self._depth = DepthWatch(self, self._follow_depth, self._ask)
         self._continuity, self._since, self._complaint = Continuity(), 'nothing yet', ''
         self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
         self._logged_advice, self._mode = Advice(), Mode.WAITING
@@ -206,8 +206,7 @@ class MonitorNode(ParameterNode):
         self._detector = self._new_detector()
         self._next_report = -math.inf
         self._depth.forget()
-        if self._asked is not None:
-            self._asked.ask()  # it may be another machine
+        self._ask()  # it may be another machine
         return True
 
     def _end_silence(self, start: str) -> None:
@@ -236,6 +235,13 @@ class MonitorNode(ParameterNode):
         if now - self._leapt_at > (2.0 * _MIXED if many else 0.0):
             self._senders = []
             self._continuity.last = None
+
+    def _follow_depth(self, factor: float) -> None:
+        self._detector.follow_depth(factor)
+
+    def _ask(self) -> None:
+        if self._asked is not None:
+            self._asked.ask()
 
     def _learn(self, machine: Machine, file: MachineDescription | None) -> None:
         """Take the machine that the lathe says it is, with the speeds that its spindle has."""
@@ -338,7 +344,7 @@ class MonitorNode(ParameterNode):
             lost = 'so what gets lost is not sent again'
             self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')
         if self._asked is not None and not self._asked.answered:
-            self._asked.ask()
+            self._ask()
         silent = self._heard_at == self._reported_at
         if silent and self._senders:
             self._senders, self._continuity.last = [], None

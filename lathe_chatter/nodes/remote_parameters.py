@@ -18,7 +18,7 @@ from lathe_chatter.model.lathe_parameter_table import (
     MACHINE_FILE,
     MACHINE_ROWS,
     described_by,
-    machine_from,
+    machine_in_cut,
 )
 from lathe_chatter.model.machine_file import MachineDescription
 
@@ -31,7 +31,8 @@ _PATIENCE = 1.0
 """s after which an unanswered node is asked again: on a busy machine answers may be lost."""
 _LONGEST_WAIT = 30.0
 """s for which an answer is awaited where something depends on it."""
-_MACHINE = [MACHINE_FILE.name, *(row.name for row in MACHINE_ROWS)]
+CONTACT = 'bearing_contact'
+_MACHINE = [MACHINE_FILE.name, CONTACT, *(row.name for row in MACHINE_ROWS)]
 
 OnMachine = Callable[[Machine, MachineDescription | None], None]
 Answer = Callable[[str, dict[str, Any]], None]
@@ -191,7 +192,7 @@ class RemoteMachine:
         described = bool(known.get(MACHINE_FILE.name))
         lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in known]
         try:
-            machine, file = machine_from(known), described_by(known)
+            machine, file = machine_in_cut(known), described_by(known)
         except LatheChatterError as error:
             self._complain(str(error))
         else:

@@ -21,7 +21,7 @@ from lathe_chatter.lathe.change_and_knock_sentences import (
     knock_sentence,
 )
 from lathe_chatter.lathe.config import LatheConfig, config_from
-from lathe_chatter.model.lathe_parameter_table import LATHE, described_by
+from lathe_chatter.model.lathe_parameter_table import LATHE, described_by, machine_in_cut
 from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.scenario.player import ScenarioPlayer
@@ -113,7 +113,9 @@ def _detector_for(config: LatheConfig, scenario: Scenario) -> ChatterDetector:
     """One that knows the machine, and recommends what its spindle can."""
     described = described_by(scenario.parameters)
     speeds = speeds_to_recommend(described.speed_range if described else None)
-    return ChatterDetector(config.machine, speed_range=speeds)
+    steady = not any('bearing_contact' in step.changes for step in scenario.steps)
+    machine = machine_in_cut(scenario.parameters) if steady else config.machine
+    return ChatterDetector(machine, speed_range=speeds)
 
 
 class _Simulation:

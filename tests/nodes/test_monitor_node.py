@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -24,6 +25,8 @@ from lathe_chatter.samples.codec import encode_block
 from lathe_chatter.stability import rightmost_root
 
 BLOCK = 200
+BARE = '{workpiece: {modes: [{frequency: 120 Hz, damping_ratio: 3 %, mass: 20 kg}]}}'
+"""A machine file without a bearing."""
 STABLE = Cut(bearing_contact=BearingContact.NONE)
 UNSTABLE = Cut(depth_of_cut=0.001, bearing_contact=BearingContact.NONE)
 FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
@@ -305,6 +308,20 @@ def test_the_machine_is_asked_from_the_lathe(start: Callable[..., Any], bench: B
     monitor = start(MonitorNode, model='lathe')
     bench.spin_until(lambda: monitor.machine is not None, 'the answer of the lathe')
     assert monitor.machine.workpiece.mass == other
+
+
+def test_a_bearing_is_assumed_only_while_the_lathe_has_one(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    monitor = start(MonitorNode)
+    start(LatheNode, machine=BARE)
+
+    def stiffness() -> float:
+        return monitor.machine.bearing_stiffness if monitor.machine is not None else math.nan
+
+    bench.spin_until(lambda: stiffness() == 0.0, 'a machine without a bearing')
+    assert bench.set_together('/lathe', bearing_contact='gap').successful
+    bench.spin_until(lambda: stiffness() > 0.0, 'the bearing of a cut that has one')
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import Any
@@ -15,13 +16,14 @@ from std_msgs.msg import Bool, Float64MultiArray
 from support.node_bench import LATCHED, Bench
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.detection import Estimate
+from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.detection.estimate import STATES, Mode
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model.lathe_parameter_table import machine_in_cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
-from lathe_chatter.nodes.monitor_sentences import SENTENCES, clearance, onset
+from lathe_chatter.nodes.monitor_sentences import SENTENCES, clearance, details, onset
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
 
@@ -273,6 +275,25 @@ def test_that_chatter_is_over_reads_well_whatever_the_state() -> None:
         'chatter': f'{over}.',
     }
     assert all(re.fullmatch(SENTENCES['clearance'].pattern, each) for each in said.values())
+
+
+def test_nothing_is_said_of_a_bearing_that_the_machine_has_not() -> None:
+    file = (
+        '{tool: {modes: [{frequency: 300 Hz, damping_ratio: 3 %, mass: 2 kg}]}, '
+        'workpiece: {modes: [{frequency: 120 Hz, damping_ratio: 3 %, mass: 20 kg}]}, '
+        'material: {cutting_coefficient: 1500 MPa}}'
+    )
+    cut = Cut(1200.0, 0.5e-3, force_noise=0.01, **OPEN)
+    keys = {'bearing engaged', 'stiffness under the workpiece, N/m'}
+    for contact in ('none', 'seated'):
+        told = machine_in_cut({'machine': file, 'bearing_contact': contact})
+        lathe = VirtualLathe(told, cut)
+        detector = ChatterDetector(told)
+        for _ in range(20):
+            estimate = detector.update(lathe.advance(1000), SAMPLE_COLUMNS)
+        assert estimate.mode is Mode.FULL
+        assert math.isfinite(estimate.cutting_stiffness)
+        assert keys & details(estimate).keys() == (set() if contact == 'none' else keys)
 
 
 def test_a_space_after_the_comma_of_a_label_is_no_part_of_a_name(
