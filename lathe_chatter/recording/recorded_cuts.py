@@ -37,8 +37,11 @@ class RecordedCuts:
     messages: list[Placed]
 
     def session_at(self, received: int) -> CutSession:
-        """The session of the samples that were received about a time, ns without steps."""
-        block = int(np.searchsorted(self.timeline.received, received))
+        """The session of the last samples that were received by a time, ns without steps.
+
+        What the monitor says is of samples that have come, not of those after a reset.
+        """
+        block = max(int(np.searchsorted(self.timeline.received, received, 'right')) - 1, 0)
         for session in self.log.sessions:
             if session.blocks.start <= block < session.blocks.stop:
                 return session

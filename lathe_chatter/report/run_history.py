@@ -151,7 +151,8 @@ class History:
         found += (change for change in self.changes if change not in at_ends)
         found += (knock for knock in self.knocks if knock not in at_ends)
         found += self.flags
-        return sorted(found, key=lambda each: each.time)
+        # A flag at the time at which a session begins is of the one before: no sample had come.
+        return sorted(found, key=lambda each: (round(each.time, 9), not isinstance(each, Flag)))
 
     def session_at(self, time: float) -> Session:
         """The session in which a time is, s."""

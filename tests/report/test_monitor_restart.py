@@ -58,3 +58,29 @@ def test_a_monitor_that_is_started_anew_clears_nothing(run: Path) -> None:
         pytest.approx((0.2, 0.4), abs=0.01),
         pytest.approx((0.6, 0.8), abs=0.01),
     ]
+
+
+def test_what_is_said_of_a_cut_that_ended_is_not_of_the_one_after(tmp_path: Path) -> None:
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.add_topic(topic_of_type('/lathe/samples', SAMPLES_TYPE))
+        writer.add_topic(topic_of_type(FLAG, BOOL))
+
+        def write(topic: str, data: bytes, number: int, at: float) -> None:
+            now = START + round(1e9 * at)
+            writer.write(topic, data, sequence=number, log_time=now, publish_time=now)
+
+        for begin in (0.0, 5.0):  # a reset, after the lathe has stood still for a while
+            lathe = VirtualLathe()
+            for k in range(100):
+                block = encode_block(lathe.advance(20))
+                write('/lathe/samples', block, k + 1, begin + 0.002 * (k + 1))
+            if not begin:
+                write(FLAG, message_bytes(BOOL, data=True), 1, 0.25)
+    history = read_history(tmp_path / 'run')
+    (flag,) = history.flags
+    assert flag.time == pytest.approx(0.2)
+    assert flag.time <= history.later_sessions[0].time
+    assert [in_words(event) for event in history.in_order()][:2] == [
+        'chatter flagged',
+        in_words(history.later_sessions[0]),
+    ]
