@@ -25,7 +25,7 @@ from lathe_chatter.stability import rightmost_root, safe_limit
 LATHE_LOOP, DETECTOR_LOOP = 'lathe', 'detector'
 _CUT = Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.SEATED)
 _SAMPLE_RATE = 1e4
-_SENTENCE = 'Compiling the inner loops, once on this machine: a minute or two ...'
+_SENTENCE = 'Compiling the inner loops, once for each installation: a minute or two ...'
 
 
 def precompile(*parts: str, say: Callable[[str], object] = lambda _sentence: None) -> None:
