@@ -52,13 +52,12 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
     machines = {number: drawn_machine(plan, number) for number in part[1]}
     table, runs = windows_of(plan, machines)
     files = _files_of(plan, table, runs)
-    count = len(table['machine'])
     digest = hashlib.sha256(b''.join(values.tobytes() for values in table.values()))
     return files, {
         'part': part[0],
-        'windows': count,
+        'windows': len(table['machine']),
         'stable': int(table['stable'].sum()),
-        'ended_early': len(runs) * len(plan.starts) - count,
+        'ended_early': len(runs) * len(plan.starts) - len(table['machine']),
         'windows_sha256': digest.hexdigest(),
         'files': {n: [len(b), hashlib.sha256(b).hexdigest()] for n, b in files.items()},
         'machines': {number: config.description.sections() for number, config in machines.items()},

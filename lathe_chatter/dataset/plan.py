@@ -164,11 +164,13 @@ def load_plan(path: Path | str) -> Plan:
 def _plan(top: Section, path: Path, text: str) -> Plan:
     values = _values_of(top, [*_TOP, Row('form', 'parquet', '', choices=Form)], *_INNER)
     sensors, windows = top.inner('sensors'), top.inner('windows')
+    events = top.items('events') if 'events' in top.nodes else ()
     rate = _values_of(sensors, [LATHE['sample_rate']], 'columns')['sample_rate']
     samples = round(values['duration'] * rate)
-    length, every, first = (round(v * rate) for v in _values_of(windows, _WINDOWS).values())
-    length = length or samples - first
-    if not 1 <= length <= samples - first:
+    # What is shorter than a sample is one.
+    spans = (math.ceil(v * rate - 1e-6) for v in _values_of(windows, _WINDOWS).values())
+    length, every, first = spans
+    if not 1 <= (length := length or samples - first) <= samples - first:
         raise windows.refused(f'a window must lie within the run of {values["duration"]:g} s')
     return Plan(
         **{**values, 'title': values['title'] or path.stem, 'form': Form(values['form'])},
@@ -176,7 +178,7 @@ def _plan(top: Section, path: Path, text: str) -> Plan:
         cut=_distributions(top.inner('cut'), CUT),
         columns=_columns(sensors),
         sample_rate=rate,
-        events=tuple(map(_event, top.items('events'))) if 'events' in top.nodes else (),
+        events=tuple(_event(each, values['duration']) for each in events),
         samples=samples,
         length=length,
         starts=range(first, samples - length + 1, every or length),
@@ -216,12 +218,12 @@ def _columns(section: Section) -> tuple[str, ...]:
     raise section.refused(f'columns must be a list of some of {", ".join(known)}', node)
 
 
-def _event(entry: Section) -> Event:
+def _event(entry: Section, duration: float) -> Event:
     single = _values_of(entry, _EVENT, *_DRAWN, 'set')
     at, knock = map(_distributions(entry, _DRAWN, *single, 'set').get, _DRAWN)
     changes = _distributions(entry.inner('set'), CUT)
-    if at is None or not (changes or knock):
-        raise entry.refused('an event needs at, and set or knock')
+    if at is None or min(at.values) >= duration or not (changes or knock):
+        raise entry.refused(f'an event needs at, within {duration:g} s, and set or knock')
     if single['over'] and (words := [n for n in changes if CUT[n].limits is None]):
         raise entry.refused(f'{words[0]} can only change at once, without over')
     return Event(at, changes, knock, **single)

@@ -67,7 +67,8 @@ def test_what_a_machine_file_lacks_is_known_unless_the_plan_has_it(tmp_path: Pat
         ),
         ('machine: {errors: "luck=2%"}', 'of frequency, damping, stiffness and C'),
         ('sensors: {columns: [tool_position]}', 'columns must be a list of some of time, '),
-        ('events: [{at: 1}]', 'an event needs at, and set or knock'),
+        ('events: [{at: 1}]', 'an event needs at, within 2 s, and set or knock'),
+        ('events: [{at: 3, knock: 1e-3}]', 'an event needs at, within 2 s, and set or knock'),
         (
             'events: [{at: 1, over: 1, set: {bearing_contact: gap}}]',
             'bearing_contact can only change at once',
@@ -114,6 +115,11 @@ def test_what_is_drawn_is_what_the_plan_says(tmp_path: Path) -> None:
         assert run.cuts[0].depth_of_cut == pytest.approx(0.9 * limit)
     assert len({run.config.setup.seed for run in runs}) == len(runs)
     assert drawn_run(plan, 7, drawn_machine(plan, 7), 0) == runs[7]
+
+
+def test_a_window_of_less_than_a_sample_is_not_the_whole_run(tmp_path: Path) -> None:
+    (tmp_path / 'a.yaml').write_text('windows: {length: 0.05 ms, every: 0.3 s}')
+    assert load_plan(tmp_path / 'a.yaml').length == 1
 
 
 def test_machines_come_from_files_beside_the_plan(tmp_path: Path) -> None:
