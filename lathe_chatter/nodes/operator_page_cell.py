@@ -23,7 +23,7 @@ from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.sample_receiver import join_blocks
 from lathe_chatter.page.live_signals import LiveSignals
 from lathe_chatter.page.server import Viewer
-from lathe_chatter.page.stability_chart import chart_key, speeds_beyond, stability_chart
+from lathe_chatter.page.stability_chart import chart_key, fits, stability_chart
 from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step, find_scenario, load_scenario
@@ -179,8 +179,7 @@ class OperatedCell:
             return
         recommended = self._figures_now().get('recommended_speed_rpm')
         speeds = values.get('spindle_speed_rpm'), recommended
-        beyond = speeds_beyond(self.board.get('chart'), speeds)
-        if beyond or chart_key(values) != self._chart_of:
+        if not fits(self.board.get('chart'), speeds) or chart_key(values) != self._chart_of:
             self._charting, self._chart_of = True, chart_key(values)
             self._run(self._draw_chart(dict(values), speeds))
 
@@ -240,7 +239,9 @@ class OperatedCell:
                 await self.clients.set(wish['node'], dict(wish['values']))
                 return ''
             case 'knock':
-                self.clients.knock(wish['impulse'])
+                # One that was killed is on its topic for long still, and nothing answers for it.
+                there = self._heard.silence(self._names['lathe']) < _SILENCE
+                self.clients.knock(wish['impulse'], there=there)
                 return f'Knocked with {wish["impulse"] * 1e3:g} mN s.'
             case 'play':
                 return await self._begin(load_scenario(find_scenario(str(wish['scenario']))))

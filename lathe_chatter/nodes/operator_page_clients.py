@@ -165,18 +165,24 @@ class CellClients:
             raise LatheChatterError(answer.message)
         return str(answer.message)
 
-    def knock(self, impulse: float) -> None:
-        """Hit the tool with an impulse, N s.
+    def knock(self, impulse: float, *, there: bool) -> None:
+        """Hit the tool with an impulse, N s, of a lathe that speaks or does not.
 
         Raises:
-            ParameterError: If it is none.
+            LatheChatterError: If it is none, or nobody is there to take it.
         """
-        self._knocks.publish(Float64(data=IMPULSE.check('impulse', impulse)))
+        message = Float64(data=IMPULSE.check('impulse', impulse))
+        if not (there and self._knocks.get_subscription_count()):
+            raise self._not_there('lathe')
+        self._knocks.publish(message)
+
+    def _not_there(self, who: str) -> LatheChatterError:
+        return LatheChatterError(f'{self.names[who]} is not there.')
 
     async def _call(self, who: str, name: str, **given: Any) -> Any:
         client = self._clients[who, name]
         if not client.service_is_ready():
-            raise LatheChatterError(f'{self.names[who]} is not there.')
+            raise self._not_there(who)
         answered: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         future = client.call_async(client.srv_type.Request(**given))
         future.add_done_callback(partial(_hand_on, answered))

@@ -18,7 +18,7 @@ from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
-from lathe_chatter.page.stability_chart import draw_chart, speeds_beyond
+from lathe_chatter.page.stability_chart import draw_chart, fits
 from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.chunk_messages import messages_of
@@ -258,7 +258,7 @@ class RecordedRun:
         )  # fmt: skip
         shown = None if self._chart_of is None else self._chart_of[1]
         speeds = cut.spindle_speed_rpm, recommended
-        if self._chart_of is None or self._chart_of[0] != key or speeds_beyond(shown, speeds):
+        if self._chart_of is None or self._chart_of[0] != key or not fits(shown, speeds):
             chart = draw_chart(
                 session.machine, cut, session.described, speeds,
                 tool_leaves_cut=session.tool_leaves_cut,

@@ -15,6 +15,7 @@ from lathe_chatter.report.probability_chart import interpolation_speeds
 from lathe_chatter.report.stability_chart import (
     chart_limits,
     chart_speeds,
+    speeds_of_lobes,
     top_of_chart,
     usual_speeds,
     with_room_for,
@@ -32,6 +33,8 @@ _MATTERS = [
     if not row.only_samples and not row.node_only and row.name not in _OF_ITS_POINT
 ]
 _MACHINES = 400
+_TOO_WIDE = 1.1
+"""Ratio of an end of a chart to where it may be, from which it is drawn anew."""
 
 
 def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -39,11 +42,18 @@ def chart_key(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: values[name] for name in _MATTERS if name in values}
 
 
-def speeds_beyond(chart: Any, speeds: Iterable[float | None]) -> list[float]:
-    """Those of some speeds, rev/min, that a chart does not show; None is none of them."""
-    ends = chart.get('speed') if chart else None
+def fits(chart: Any, speeds: Iterable[float | None]) -> bool:
+    """Whether a chart shows some speeds, rev/min, and is not wide for others that are gone.
+
+    None is no speed; no chart, and one that could not be drawn, fit.
+    """
+    if not chart or 'speed' not in chart:
+        return True
     known = [speed for speed in speeds if speed is not None]
-    return [speed for speed in known if ends and not ends[0] <= speed <= ends[-1]]
+    first, last = chart['speed'][0], chart['speed'][-1]
+    low, high = with_room_for(chart['usual'], known)
+    shown = all(first <= speed <= last for speed in known)
+    return shown and last <= high * _TOO_WIDE and low <= first * _TOO_WIDE
 
 
 def stability_chart(
@@ -83,12 +93,14 @@ def draw_chart(
         tool_leaves_cut: The force law, see `VirtualLathe`.
     """
     spindle = described.speed_range if described else None
-    shown = spindle or usual_speeds(machine, cut)
-    low, high = with_room_for(shown, speeds_beyond({'speed': shown}, more_speeds))
+    first, last = spindle or usual_speeds(machine, cut)
+    beyond = [n for n in more_speeds if n is not None and not first <= n <= last]
+    low, high = with_room_for((first, last), beyond)
     speeds = chart_speeds(low, high)
     limits = chart_limits(machine, cut, speeds, tool_leaves_cut=tool_leaves_cut)
     found: dict[str, Any] = {name: finite(getattr(limits, name)) for name in LIMITS}
     found['speed'] = limits.spindle_speed_rpm.tolist()
+    found['usual'] = list(spindle or speeds_of_lobes(machine))
     found['contact'] = cut.bearing_contact.value
     found['top'] = top_of_chart(cut, limits)
     if described is not None and described.uncertainty:

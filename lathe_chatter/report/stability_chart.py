@@ -81,13 +81,18 @@ def chart_limits(
 
 def usual_speeds(machine: Machine, cut: Cut) -> tuple[float, float]:
     """Some lobes of the most flexible mode, and the cut, rev/min."""
+    return with_room_for(speeds_of_lobes(machine), [cut.spindle_speed_rpm])
+
+
+def speeds_of_lobes(machine: Machine) -> tuple[float, float]:
+    """Some lobes of the most flexible mode, rev/min."""
     modes = (*machine.tool.modes, *machine.workpiece.modes)
     flexible = min(modes, key=lambda mode: mode.stiffness)
     low, high = (
         float(f'{turns * 60.0 * flexible.natural_frequency / (2.0 * math.pi):.2g}')
         for turns in _USUAL
     )
-    return with_room_for((low, high), [cut.spindle_speed_rpm])
+    return low, high
 
 
 def with_room_for(shown: tuple[float, float], speeds: Iterable[float]) -> tuple[float, float]:

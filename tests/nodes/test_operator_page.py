@@ -120,6 +120,8 @@ def test_a_cut_that_has_ended_says_so_and_begins_anew(browser: Browser) -> None:
         'document.querySelector("#gone").textContent', 'how it goes on'
     )  # fmt: skip
     assert 'displacement' in told
+    browser.until(f'{LAMP} === "unknown"', 'that nothing is known of it')
+    assert browser.text('#health') == 'The cut has ended.'
     browser.click('[data-call=reset]')
     browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
     browser.until('document.querySelector("#gone").hidden', 'nothing amiss', PATIENCE)
@@ -271,6 +273,25 @@ def test_it_fits_the_screen_and_axe_has_nothing_to_say(
     assert found == []
 
 
+def test_the_plots_stay_together_beside_controls_of_any_length(browser: Browser) -> None:
+    def box(of: str, side: str) -> float:
+        return float(browser.run(f'document.querySelector("{of}").getBoundingClientRect().{side}'))
+
+    more = '[...document.querySelectorAll("#controls details")].forEach(e => { e.open = %s; })'
+    browser.resize(1400)
+    try:
+        drawn = 'plots.get("chart") && plots.get("spectrum") && plots.get("workpiece-portrait")'
+        browser.until(drawn, 'the plots', PATIENCE)
+        browser.run(more % 'true')
+        plots = max(box('.signals', 'bottom'), box('.closeup', 'bottom'))
+        assert box('.controls', 'bottom') > plots + 200
+        assert box('.log', 'top') - plots < 20
+        assert box('.closeup', 'top') - box('.chart', 'bottom') < 20
+    finally:
+        browser.run(more % 'false')
+        browser.resize(1280)
+
+
 def test_legends_follow_the_theme(browser: Browser) -> None:
     browser.until('plots.get("chart") && plots.get("displacement-0")', 'chart and signals')
     mark = '.u-series:not(:first-child) .u-marker'
@@ -297,8 +318,18 @@ def test_legends_follow_the_theme(browser: Browser) -> None:
 
 
 def test_a_killed_lathe_is_told_and_is_back_by_itself(page: Page, browser: Browser) -> None:
+    operate(browser)
+    browser.until('document.querySelector("#health").textContent.includes("real time")', 'pace')
     page.kill('lathe')
     browser.until('document.querySelector("#gone").textContent.includes("/lathe is silent")', '')
+    assert browser.run(LAMP) == 'unknown'
+    assert browser.run('document.querySelector("#lamp").className').strip() == 'lamp'
+    assert browser.text('#health') == 'What you see is old.'
+    browser.run('takeCell({figures: {recommended_speed_rpm: 4000}}), showFigures()')
+    assert browser.run('document.querySelector("#take-recommended").disabled')
+    browser.click('#knock')
+    said = 'document.querySelector("#notice").textContent'
+    browser.until(f'{said} === "/lathe is not there."', 'that nobody was hit')
     page.start('lathe')
     browser.until('document.querySelector("#gone").hidden', 'the lathe', PATIENCE)
     browser.until('signals.time > 1 && signals.time < 60', 'its time', PATIENCE)
@@ -310,6 +341,8 @@ def test_a_killed_page_is_told_and_is_back_by_itself(page: Page, browser: Browse
     page.kill('operator_page')
     said = 'document.querySelector("#gone").textContent'
     browser.until(f'{said}.includes("does not answer")', 'that it is gone')
+    assert browser.run(LAMP) == 'unknown'
+    assert browser.text('#health') == 'What you see is old.'
     assert browser.run('document.querySelector("#p-depth_of_cut").disabled')
     page.start('operator_page', f'port:={port}')
     browser.until('document.querySelector("#gone").hidden && signals', 'the page', PATIENCE)

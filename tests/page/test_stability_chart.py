@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from lathe_chatter.model.lathe_parameter_table import LATHE
-from lathe_chatter.page.stability_chart import chart_key, speeds_beyond, stability_chart
+from lathe_chatter.page.stability_chart import chart_key, fits, stability_chart
 
 START = LATHE.complete({})
 
@@ -45,10 +45,27 @@ def test_what_the_key_leaves_out_changes_no_chart() -> None:
 
 def test_a_chart_has_the_speed_of_the_cut_and_the_one_that_is_recommended() -> None:
     usual, fast, slow = stability_chart(START), 27_545.0, 200.0
-    assert speeds_beyond(usual, [3000.0, None]) == []
-    assert speeds_beyond(usual, [3000.0, fast, slow]) == [fast, slow]
-    assert speeds_beyond(None, [fast]) == speeds_beyond({'error': 'no machine'}, [fast]) == []
+    assert fits(usual, [3000.0, None])
+    assert not fits(usual, [3000.0, fast])
+    assert not fits(usual, [slow])
+    assert fits(None, [fast])
+    assert fits({'error': 'no machine'}, [fast])
     wide = stability_chart(START, [fast, slow])
-    assert speeds_beyond(wide, [3000.0, fast, slow]) == []
+    assert fits(wide, [3000.0, fast, slow])
     assert min(usual['open_limit']) == pytest.approx(min(wide['open_limit']), rel=0.02)
     assert stability_chart(START, [4000.0]) == usual
+
+
+@pytest.mark.parametrize('advised', [27_465.0, 13_000.0, 200.0])
+def test_a_chart_is_no_wider_than_its_speeds_once_an_advice_is_gone(advised: float) -> None:
+    wide = stability_chart(START, [3000.0, advised])
+    assert fits(wide, [3000.0, advised])
+    assert not fits(wide, [3000.0, None])
+    assert not fits(wide, [3000.0, 4000.0])
+
+
+@pytest.mark.parametrize('speed', [900.0, 3000.0, 11_500.0, 20_000.0])
+@pytest.mark.parametrize('advised', [None, 700.0, 11_900.0, 27_465.0])
+def test_a_chart_that_is_drawn_anew_fits(speed: float, advised: float | None) -> None:
+    values = {**START, 'spindle_speed_rpm': speed}
+    assert fits(stability_chart(values, [speed, advised]), [speed, advised])

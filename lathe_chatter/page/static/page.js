@@ -57,7 +57,8 @@ function connect() {
     const wait = Math.min(5, 0.5 * 2 ** retries++);
     $('gone').textContent = `${event.reason || 'The server of this page does not answer.'} What you see is old. Trying again (${retries}) ...`;
     $('gone').hidden = false;
-    lock();
+    showLamp();
+    showStatuses();
     setTimeout(connect, wait * 1000);
   };
 }
@@ -148,7 +149,7 @@ function lock() {
   if (recorded) return;
   const mine = server.operating && socket.readyState === WebSocket.OPEN;
   document.querySelectorAll('.act').forEach(each => { each.disabled = !mine; });
-  recommended = cell.figures?.recommended_speed_rpm;
+  recommended = stale() ? null : cell.figures?.recommended_speed_rpm;
   $('take-recommended').disabled = !mine || !recommended;
   $('take-recommended').textContent = recommended ? `Set ${Math.round(recommended)} rev/min` : 'No speed is recommended';
 }
@@ -159,7 +160,7 @@ function takeCell(news) {
     lathe_rows: makeControls, lathe_values: showValues, supervisor_rows: makeSupervisor,
     supervisor_values: values => { if (document.activeElement !== $('mode')) $('mode').value = values.mode; },
     action: text => { $('action').textContent = text; }, figures: () => { figuresDue = true; }, flag: showLamp, state: showLamp,
-    alive: showAlive, statuses: showStatuses, log: showLog, chart: showChart, charting: showChart,
+    alive: showAlive, statuses: showAlive, log: showLog, chart: showChart, charting: showChart,
     scenario: showScenario,
   };
   for (const name of Object.keys(news)) shown[name]?.(news[name]);
@@ -168,6 +169,15 @@ function takeCell(news) {
 function showGone(text) {
   $('gone').textContent = text;
   $('gone').hidden = !text;
+}
+
+// Why what is seen holds no more, in words; none where it holds.
+function stale() {
+  if (recorded) return '';
+  if (socket.readyState !== WebSocket.OPEN) return 'What you see is old.';
+  const {lathe, samples} = cell.alive ?? {samples: true}, run = cell.statuses?.lathe?.pace?.message;
+  if (samples || (lathe && run === 'paused')) return '';
+  return lathe && run === 'ended' ? 'The cut has ended.' : 'What you see is old.';
 }
 
 function showAlive() {
@@ -182,12 +192,12 @@ function showAlive() {
   const heard = cell.statuses?.monitor?.samples;
   for (const text of [cell.complaint, heard?.level > 1 ? heard.message : '']) if (text) words.push(text);
   showGone(words.join(' '));
-  if (!monitor) $('lamp').className = 'lamp';
   showLamp();
+  showStatuses();
 }
 
 function showLamp() {
-  const {flag, state, alive} = cell, known = flag && (recorded || alive?.monitor);
+  const {flag, state, alive} = cell, known = flag && !stale() && (recorded || alive?.monitor);
   $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
   const word = !known ? 'unknown' : flag.up ? 'CHATTER' : state ?? 'no chatter';
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
@@ -199,7 +209,7 @@ function showLamp() {
 
 function showFigures() {
   figuresDue = false;
-  const f = cell.figures ?? {}, cut = cell.statuses?.monitor?.cut?.values ?? {};
+  const f = (!stale() && cell.figures) || {}, cut = cell.statuses?.monitor?.cut?.values ?? {};
   const error = key => (cut[key] == null || isNaN(cut[key]) ? '' : ` ± ${number(Number(cut[key]), 2)}`);
   const margin = cut['standard error of the margin'];
   const texts = {
@@ -214,7 +224,7 @@ function showFigures() {
 }
 
 function showStatuses() {
-  const {lathe, monitor, recorder} = cell.statuses, pace = lathe?.pace, v = pace?.values ?? {};
+  const {lathe, monitor, recorder} = cell.statuses ?? {}, pace = lathe?.pace, v = pace?.values ?? {};
   const paused = pace?.message === 'paused';
   const button = document.querySelector('[data-call=pause], [data-call=resume]');
   button.dataset.call = paused ? 'resume' : 'pause';
@@ -222,13 +232,12 @@ function showStatuses() {
   const lost = [
     [Number(monitor?.samples?.values?.['samples lost'] ?? 0), 'the monitor'],
     [Number(recorder?.recording?.values?.lost ?? 0), 'the recorder'], [signals?.lost ?? 0, 'this page'],
-  ].filter(([count]) => count).map(([count, who]) => `${count} by ${who}`);
+  ].filter(([count]) => count).map(([count, who]) => `${count} by ${who}`), old = stale();
   $('health').className = (pace?.level ?? 0) || lost.length ? 'bad' : '';
-  $('health').textContent = pace ? `${pace.message}: ${number(Number(v['real-time factor']))} × real time, late by ${number(Number(v['lateness p99, us']) / 1e3)} ms (p99), ${number(Number(v['lag given up, s']))} s given up. Lost: ${lost.join(', ') || 'nothing'}.` : '';
+  $('health').textContent = old ? `${old}${lost.length ? ` Lost: ${lost.join(', ')}.` : ''}` : pace ? `${pace.message}: ${number(Number(v['real-time factor']))} × real time, late by ${number(Number(v['lateness p99, us']) / 1e3)} ms (p99), ${number(Number(v['lag given up, s']))} s given up. Lost: ${lost.join(', ') || 'nothing'}.` : '';
   const recording = recorder?.recording;
   $('recording').textContent = recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
   showFigures();
-  if (cell.alive) showAlive();
 }
 
 function showLog() {
