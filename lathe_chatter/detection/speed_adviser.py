@@ -60,19 +60,19 @@ class AdviceRequest:
         machine: Tool, workpiece and bearing; None where C w was not identified, and the rule
             60 f_c / k has to do.
         speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
-        earlier: Of the same cut, from an estimate that was less sure: its answer is kept to unless
-            another is clearly better.
+        said_rpm: What those who asked were told of the same cut before, rev/min, nan for nothing;
+            it is kept to unless another is clearly better.
     """
 
     known: Identified
     machine: Machine | None
     speed_range: tuple[float, float]
-    earlier: AdviceRequest | None = field(default=None, repr=False, compare=False)
+    said_rpm: float = field(default=math.nan, repr=False, compare=False)
 
     def within(self, speed_range: tuple[float, float]) -> AdviceRequest:
         """The same with another range of speeds: itself, with its answer, where it is the same."""
         same = speed_range == self.speed_range
-        return self if same else replace(self, speed_range=speed_range, earlier=self)
+        return self if same else replace(self, speed_range=speed_range, said_rpm=self.told_rpm)
 
     def at_depth(self, factor: float) -> AdviceRequest | None:
         """For a depth of cut that is so many times as large, nan for unknown: None then."""
@@ -84,7 +84,7 @@ class AdviceRequest:
         known = self.known._replace(
             cutting_stiffness=factor * cutting, cutting_error=factor * error
         )
-        return replace(self, known=known, earlier=self)
+        return replace(self, known=known, said_rpm=self.told_rpm)
 
     @cached_property
     def answer(self) -> Advice:
@@ -103,15 +103,16 @@ class AdviceRequest:
                 known.spindle_speed_rpm,
                 seated=_seated(self.machine, known.workpiece_stiffness),
                 cutting_error=known.cutting_error,
-                said_rpm=self._said(),
+                said_rpm=self.said_rpm,
             )
         return replace(found, found_at_rpm=known.spindle_speed_rpm)
 
-    def _said(self) -> float:
-        """The speed that was recommended before, rev/min; nan for none."""
-        if self.earlier is None or self.earlier.machine is None:
-            return math.nan
-        speeds = self.earlier.answer.speeds
+    @property
+    def told_rpm(self) -> float:
+        """The speed that somebody has been told so far, rev/min; nan for none."""
+        if 'answer' not in self.__dict__ or self.machine is None:  # nobody has asked for it
+            return self.said_rpm
+        speeds = self.answer.speeds
         return speeds[0].spindle_speed_rpm if speeds else math.nan
 
 
@@ -198,8 +199,8 @@ class SpeedAdviser:
             return
         self._error = error
         self._surely_grew = max(self._surely_grew, growth - error)
-        earlier = None if tried else self.request
-        self.request = AdviceRequest(known, self.machine, self.speed_range, earlier)
+        said = math.nan if tried or self.request is None else self.request.told_rpm
+        self.request = AdviceRequest(known, self.machine, self.speed_range, said)
 
 
 def _seated(machine: Machine, stiffness: float) -> bool | None:
