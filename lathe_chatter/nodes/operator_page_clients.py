@@ -171,10 +171,9 @@ class CellClients:
         Raises:
             LatheChatterError: If it is none, or nobody is there to take it.
         """
-        message = Float64(data=IMPULSE.check('impulse', impulse))
         if not (there and self._knocks.get_subscription_count()):
             raise self._not_there('lathe')
-        self._knocks.publish(message)
+        self._knocks.publish(Float64(data=IMPULSE.check('impulse', impulse)))
 
     def _not_there(self, who: str) -> LatheChatterError:
         return LatheChatterError(f'{self.names[who]} is not there.')
