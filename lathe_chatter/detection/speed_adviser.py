@@ -60,19 +60,19 @@ class AdviceRequest:
         machine: Tool, workpiece and bearing; None where C w was not identified, and the rule
             60 f_c / k has to do.
         speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
-        said_rpm: What those who asked were told of the same cut before, rev/min, nan for nothing;
-            it is kept to unless another is clearly better.
+        earlier: Of the same cut, from an estimate that was less sure: its answer is kept to unless
+            another is clearly better.
     """
 
     known: Identified
     machine: Machine | None
     speed_range: tuple[float, float]
-    said_rpm: float = field(default=math.nan, repr=False, compare=False)
+    earlier: AdviceRequest | None = field(default=None, repr=False, compare=False)
 
     def within(self, speed_range: tuple[float, float]) -> AdviceRequest:
         """The same with another range of speeds: itself, with its answer, where it is the same."""
         same = speed_range == self.speed_range
-        return self if same else replace(self, speed_range=speed_range, said_rpm=self.told_rpm)
+        return self if same else replace(self, speed_range=speed_range, earlier=self)
 
     def at_depth(self, factor: float) -> AdviceRequest | None:
         """For a depth of cut that is so many times as large, nan for unknown: None then."""
@@ -84,7 +84,7 @@ class AdviceRequest:
         known = self.known._replace(
             cutting_stiffness=factor * cutting, cutting_error=factor * error
         )
-        return replace(self, known=known, said_rpm=self.told_rpm)
+        return replace(self, known=known, earlier=self)
 
     @cached_property
     def answer(self) -> Advice:
@@ -103,16 +103,15 @@ class AdviceRequest:
                 known.spindle_speed_rpm,
                 seated=_seated(self.machine, known.workpiece_stiffness),
                 cutting_error=known.cutting_error,
-                said_rpm=self.said_rpm,
+                said_rpm=self._said(),
             )
         return replace(found, found_at_rpm=known.spindle_speed_rpm)
 
-    @property
-    def told_rpm(self) -> float:
-        """The speed that somebody has been told so far, rev/min; nan for none."""
-        if 'answer' not in self.__dict__ or self.machine is None:  # nobody has asked for it
-            return self.said_rpm
-        speeds = self.answer.speeds
+    def _said(self) -> float:
+        """The speed that was recommended before, rev/min; nan for none."""
+        if self.earlier is None or self.earlier.machine is None:
+            return math.nan
+        speeds = self.earlier.answer.speeds
         return speeds[0].spindle_speed_rpm if speeds else math.nan
 
 
@@ -199,8 +198,8 @@ class SpeedAdviser:
             return
         self._error = error
         self._surely_grew = max(self._surely_grew, growth - error)
-        said = math.nan if tried or self.request is None else self.request.told_rpm
-        self.request = AdviceRequest(known, self.machine, self.speed_range, said)
+        earlier = None if tried else self.request
+        self.request = AdviceRequest(known, self.machine, self.speed_range, earlier)
 
 
 def _seated(machine: Machine, stiffness: float) -> bool | None:
