@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -141,7 +142,7 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
     *,
     seated: bool | None = None,
     cutting_error: float = 0.0,
-    said_rpm: float = math.nan,
+    advised_rpm: float = math.nan,
 ) -> Advice:
     """Speeds at which the cut is well damped whether or not the bearing carries.
 
@@ -157,7 +158,7 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
         seated: Whether the bearing carries throughout, or not at all; None where it does now
             and then, or nobody knows.
         cutting_error: Standard error of C w, N/m.
-        said_rpm: The speed that was recommended before, from an estimate that was less sure; it
+        advised_rpm: The speed that was recommended before, from an estimate that was less sure; it
             comes first unless another is clearly better. nan for none.
     """
     if not cutting_stiffness > 0.0:
@@ -174,9 +175,10 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
     regimes = (both,) if seated is None else (both, (seated,))
     found: list[tuple[float, AdvisedSpeed]] = []
     for contacts in regimes:
+        cut = _KnownCut(machine, depth, contacts)
         for limits in (near, speed_range):
             if limits[0] < limits[1]:
-                found = _stable_in(machine, depth, limits, current_rpm, contacts)
+                found = _stable_in(cut, limits, current_rpm)
                 if any(ratio > _DAMPED for ratio, _ in found):
                     break
         if found:
@@ -191,62 +193,69 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
             found.insert(0, first)
         speeds = [speed for _, speed in found[:_MOST]]
         near_ones = [speed for _, speed in damped[:_MOST]] or speeds[:1]
-        best = _wide_enough(machine, depth, near_ones, speed_range, contacts)
-        speeds[0] = _kept(machine, depth, said_rpm, best, speed_range, contacts)
+        best = _wide_enough(cut, near_ones, speed_range)
+        speeds[0] = _kept(cut, advised_rpm, best, speed_range)
         return Advice(tuple(speeds), 1.0, current_rpm)
     contacts = both if seated is None else (seated,)
-    return _less_depth(machine, depth, speed_range, contacts, cutting_error / cutting_stiffness)
+    cut = _KnownCut(machine, depth, contacts)
+    return _less_depth(cut, speed_range, cutting_error / cutting_stiffness)
+
+
+class _KnownCut(NamedTuple):
+    """A cut for which a speed is looked for, in each of some contacts (seated or not)."""
+
+    machine: Machine
+    depth: float
+    contacts: tuple[bool, ...]
+
+    def roots(self, rpm: float) -> list[complex]:
+        """The rightmost root at a speed, rev/min, in each contact."""
+        return [
+            rightmost_root(self.machine, rpm, self.depth, seated=seated)
+            for seated in self.contacts
+        ]
+
+    def growth_rate(self, rpm: float) -> float:
+        """The greatest of them, 1/s."""
+        return max(root.real for root in self.roots(rpm))
 
 
 def _wide_enough(
-    machine: Machine,
-    depth: float,
-    near_ones: list[AdvisedSpeed],
-    speed_range: tuple[float, float],
-    contacts: tuple[bool, ...],
+    cut: _KnownCut, near_ones: list[AdvisedSpeed], speed_range: tuple[float, float]
 ) -> AdvisedSpeed:
     """The middle of the first lobe that an ordinary spindle can keep to, else of the widest."""
-    best = _centred(machine, depth, near_ones[0], speed_range, contacts)
+    best = _centred(cut, near_ones[0], speed_range)
     for speed in near_ones[1:]:
         if best.width >= _WIDE:
             break
-        other = _centred(machine, depth, speed, speed_range, contacts)
+        other = _centred(cut, speed, speed_range)
         best = max(best, other, key=lambda each: each.width)
     return best
 
 
-def _kept(  # noqa: PLR0913, PLR0917 -- what is known of a cut
-    machine: Machine,
-    depth: float,
-    said_rpm: float,
-    best: AdvisedSpeed,
-    speed_range: tuple[float, float],
-    contacts: tuple[bool, ...],
+def _kept(
+    cut: _KnownCut, advised_rpm: float, best: AdvisedSpeed, speed_range: tuple[float, float]
 ) -> AdvisedSpeed:
     """The middle of the lobe that was recommended before, unless the best is clearly better."""
-    if not speed_range[0] <= said_rpm <= speed_range[1]:
+    if not speed_range[0] <= advised_rpm <= speed_range[1]:
         return best
-    roots = [rightmost_root(machine, said_rpm, depth, seated=contact) for contact in contacts]
-    said = AdvisedSpeed(said_rpm, max(root.real for root in roots))
-    if not said.growth_rate < 0.0:
+    before = AdvisedSpeed(advised_rpm, cut.growth_rate(advised_rpm))
+    if not before.growth_rate < 0.0:
         return best
-    said = _centred(machine, depth, said, speed_range, contacts)
-    damped = said.growth_rate < _KEPT * best.growth_rate
-    return said if damped and said.width > _KEPT * min(best.width, _WIDE) else best
+    before = _centred(cut, before, speed_range)
+    damped = before.growth_rate < _KEPT * best.growth_rate
+    return before if damped and before.width > _KEPT * min(best.width, _WIDE) else best
 
 
 def _centred(
-    machine: Machine,
-    depth: float,
-    speed: AdvisedSpeed,
-    speed_range: tuple[float, float],
-    contacts: tuple[bool, ...],
+    cut: _KnownCut, speed: AdvisedSpeed, speed_range: tuple[float, float]
 ) -> AdvisedSpeed:
     """The middle of the stable speeds around a stable one, and how wide they are."""
     rpm = speed.spindle_speed_rpm
     speeds = rpm * np.linspace(1.0 - _AROUND, 1.0 + _AROUND, _TRIED)
     growths = [
-        rightmost_roots(machine, speeds, depth, seated=contact).real for contact in contacts
+        rightmost_roots(cut.machine, speeds, cut.depth, seated=seated).real
+        for seated in cut.contacts
     ]
     stable = np.max(growths, axis=0) < 0.0
     stable &= (speeds >= speed_range[0]) & (speeds <= speed_range[1])
@@ -257,26 +266,21 @@ def _centred(
         high += 1
     middle = float(0.5 * (speeds[low] + speeds[high]))
     width = float(speeds[high] - speeds[low]) / middle
-    roots = [rightmost_root(machine, middle, depth, seated=contact) for contact in contacts]
-    growth = max(root.real for root in roots)
+    growth = cut.growth_rate(middle)
     if not growth < speed.growth_rate * _AS_GOOD:  # an edge of another lobe, or hardly damped
         return replace(speed, width=width)
     return AdvisedSpeed(middle, growth, width)
 
 
 def _stable_in(
-    machine: Machine,
-    depth: float,
-    limits: tuple[float, float],
-    current_rpm: float,
-    contacts: tuple[bool, ...],
+    cut: _KnownCut, limits: tuple[float, float], current_rpm: float
 ) -> list[tuple[float, AdvisedSpeed]]:
-    """The lowest of the damping ratios in some contacts (seated or not), and its speed."""
+    """The lowest of the damping ratios in the contacts, and its speed."""
     found = []
-    for seated in contacts:
+    for seated in cut.contacts:
         advice = recommend_speeds(
-            machine,
-            depth,
+            cut.machine,
+            cut.depth,
             seated=seated,
             low_rpm=limits[0],
             high_rpm=limits[1],
@@ -285,25 +289,19 @@ def _stable_in(
         )
         for speed in advice.speeds:
             rpm = speed.spindle_speed_rpm
-            roots = [rightmost_root(machine, rpm, depth, seated=contact) for contact in contacts]
+            roots = cut.roots(rpm)
             ratio = min(-root.real / root.imag for root in roots)
             if ratio > 0.0:
                 found.append((ratio, AdvisedSpeed(rpm, max(root.real for root in roots))))
     return found
 
 
-def _less_depth(
-    machine: Machine,
-    depth: float,
-    speed_range: tuple[float, float],
-    contacts: tuple[bool, ...],
-    error: float,
-) -> Advice:
+def _less_depth(cut: _KnownCut, speed_range: tuple[float, float], error: float) -> Advice:
     """The deepest cut that some speed keeps stable, in every contact."""
-    shallower, rpm = depth, math.nan
-    for seated in contacts:
+    shallower, rpm = cut.depth, math.nan
+    for seated in cut.contacts:
         advice = recommend_speeds(
-            machine,
+            cut.machine,
             shallower,
             seated=seated,
             low_rpm=speed_range[0],
@@ -312,7 +310,7 @@ def _less_depth(
         )
         shallower, rpm = advice.stable_depth, advice.stable_speed_rpm
     share = _SHARE / (1.0 + 2.0 * min(error, 1.0))
-    return Advice((), share * shallower / depth, rpm)
+    return Advice((), share * shallower / cut.depth, rpm)
 
 
 def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:

@@ -103,11 +103,11 @@ class AdviceRequest:
                 known.spindle_speed_rpm,
                 seated=_seated(self.machine, known.workpiece_stiffness),
                 cutting_error=known.cutting_error,
-                said_rpm=self._said(),
+                advised_rpm=self._advised_before(),
             )
         return replace(found, found_at_rpm=known.spindle_speed_rpm)
 
-    def _said(self) -> float:
+    def _advised_before(self) -> float:
         """The speed that was recommended before, rev/min; nan for none."""
         if self.earlier is None or self.earlier.machine is None:
             return math.nan

@@ -146,9 +146,9 @@ class MachineDescription:
 
     def _bearing_assumed(self, taken: Machine, cut: Cut) -> str:
         """That a bearing of which the file has nothing is the paper's, or nothing."""
+        in_file, wanted = (c.bearing_contact is not BearingContact.NONE for c in (self.cut, cut))
         usual = Machine(taken.tool, taken.workpiece).bearing_stiffness
-        without = self.cut.bearing_contact is BearingContact.NONE is not cut.bearing_contact
-        if not without or taken.bearing_stiffness != usual:
+        if in_file or not wanted or taken.bearing_stiffness != usual:
             return ''
         return (
             f'The machine file {self.name} has no bearing: {usual:.4g} N/m is taken as its '

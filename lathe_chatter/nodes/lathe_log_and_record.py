@@ -87,7 +87,7 @@ class LatheRecord:
     def paced(self, time: float, factor: float) -> None:
         """Simulated time goes at another pace from a simulated time on, s."""
         pace = f'{factor:g} times as fast as the clock' if factor else 'as fast as it can'
-        said = f'At {time:.6f} s: the cut goes on {pace}.'
+        said = f'At {time:.6f} s: from here on simulated time is to go {pace}.'
         self._logger.info(said)
 
     def restarted(self, time: float, old: Cut, new: Cut) -> None:

@@ -20,8 +20,8 @@ from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.lathe_parameter_table import machine_in_cut
 from lathe_chatter.model.machine_file import MachineDescription, narrowed
-from lathe_chatter.nodes.depth_watch import DepthWatch
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from lathe_chatter.nodes.lathe_cut_watch import LatheCutWatch
 from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.monitor_sentences import (
     SENTENCES,
@@ -92,7 +92,7 @@ class MonitorNode(ParameterNode):
             self._asked = RemoteMachine(self, self._learn)
         self._speed_range = self._own_speeds()
         self._detector = self._new_detector()
-        self._depth = DepthWatch(self, self._follow_depth, self._ask)
+        self._lathe_cut = LatheCutWatch(self, self._follow_depth, self._ask)
         self._continuity, self._since, self._complaint = Continuity(), 'nothing yet', ''
         self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
         self._logged_advice, self._mode = Advice(), Mode.WAITING
@@ -205,7 +205,7 @@ class MonitorNode(ParameterNode):
             self._set_flag(times[0], raised=False)
         self._detector = self._new_detector()
         self._next_report = -math.inf
-        self._depth.forget()
+        self._lathe_cut.forget()
         self._ask()  # it may be another machine
         return True
 
@@ -344,7 +344,7 @@ class MonitorNode(ParameterNode):
             lost = 'so what gets lost is not sent again'
             self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')
         if self._asked is not None and not self._asked.answered:
-            self._ask()
+            self._asked.ask()
         silent = self._heard_at == self._reported_at
         if silent and self._senders:
             self._senders, self._continuity.last = [], None

@@ -166,9 +166,12 @@ class OperatedCell:
             self._sentences.append(dict(entry))
             self.board.put('log', [*self._sentences])
 
+    def _is_alive(self, who: str) -> bool:
+        return self._heard.silence(self._names[who]) < _SILENCE
+
     def _look(self) -> None:
         """Who is there, what they say, and what the chart is of."""
-        alive = {who: self._heard.silence(name) < _SILENCE for who, name in self._names.items()}
+        alive = {who: self._is_alive(who) for who in self._names}
         alive['samples'] = self._heard.silence(self._samples_name) < 1.0
         self.board.put('alive', alive)
         statuses = self._heard.statuses
@@ -240,8 +243,7 @@ class OperatedCell:
                 return ''
             case 'knock':
                 # One that was killed is on its topic for long still, and nothing answers for it.
-                there = self._heard.silence(self._names['lathe']) < _SILENCE
-                self.clients.knock(wish['impulse'], there=there)
+                self.clients.knock(wish['impulse'], there=self._is_alive('lathe'))
                 return f'Knocked with {wish["impulse"] * 1e3:g} mN s.'
             case 'play':
                 return await self._begin(load_scenario(find_scenario(str(wish['scenario']))))

@@ -341,7 +341,7 @@ def test_the_pace_can_change_from_free_to_timed_and_back(
         assert bench.set('/lathe', real_time_factor=factor)[0].successful
         now = len(messages)
         bench.spin_until(lambda now=now: len(messages) > now + 5, 'more samples')
-        end = f's: the cut goes on {pace}.'
+        end = f's: from here on simulated time is to go {pace}.'
         bench.spin_until(lambda end=end: any(entry.msg.endswith(end) for entry in log), pace)
     assert bench.set('/lathe', real_time_factor=0.0)[0].successful
 

@@ -17,21 +17,21 @@ from lathe_chatter.nodes.remote_parameters import CONTACT, RemoteParameters
 _DEPTH = 'depth_of_cut'
 
 
-class DepthWatch:
-    """Tells when the depth of a lathe changes, and by how much.
+class LatheCutWatch:
+    """Tells when the depth of a lathe changes, by how much, and when its bearing contact does.
 
     Args:
         node: That wants to know; the lathe is the node `lathe` beside it, remappable like its
             topics.
-        on_change: Called with the new depth over the one of before; nan where that is not known.
+        on_depth: Called with the new depth over the one of before; nan where that is not known.
         on_contact: Called when the contact of the bearing is another.
     """
 
     def __init__(
-        self, node: Node, on_change: Callable[[float], None], on_contact: Callable[[], None]
+        self, node: Node, on_depth: Callable[[float], None], on_contact: Callable[[], None]
     ) -> None:
         """Nothing is known yet."""
-        self._on_change, self._on_contact = on_change, on_contact
+        self._on_depth, self._on_contact = on_depth, on_contact
         self._depth = math.nan
         self._parameters = RemoteParameters(node, self._take)
         service = node.resolve_service_name('lathe/get_parameters')
@@ -61,6 +61,6 @@ class DepthWatch:
             if entry.name == _DEPTH:
                 before, self._depth = self._depth, float(parameter_value_to_python(entry.value))
                 if before != self._depth:
-                    self._on_change(self._depth / before if before > 0.0 else math.nan)
+                    self._on_depth(self._depth / before if before > 0.0 else math.nan)
             elif entry.name == CONTACT:
                 self._on_contact()
