@@ -2,7 +2,7 @@
 
     python benchmarks/scale.py [PART ...] [--windows N] [--workers N] [--picture FILE]
 
-Parts: truth windows hashes workers environment (all of these by default; some three minutes
+Parts: truth windows hashes workers environment (all of these by default; some six minutes
 on two idle cores) and picture. Where others use the machine the time on its clock says little:
 processor time stands beside it, and the load at the beginning. `picture` draws how time falls with
 workers that have a core each. Measured is, of 1 to 4 of them, the processor time of the busiest
@@ -240,16 +240,16 @@ def workers(options: Any) -> None:
     By processor time it is that of the thread over that of the busiest worker. What two processes
     gain that only compute is beside it: no more can be had from the cores of this machine.
     """
-    count, samples, rounds = 1000, 100_000, 3
-    ends = dict[int, set[bytes]]()
+    sizes, rounds = ((1000, 100_000), (300, 400_000)), 3  # cuts of 10 s, and of 40 s
+    ends = dict[tuple[int, int], set[bytes]]()
 
-    def swept(pool: Executor, number: int) -> tuple[float, float]:
+    def swept(pool: Executor, number: int, samples: int) -> tuple[float, float]:
         sweep = lathes(number)
         begin, own = time.perf_counter(), time.process_time()
         sweep.advance(samples, columns=[], executor=pool)
         spent = time.perf_counter() - begin, time.process_time() - own
         last = np.concatenate([lathe.advance(10) for lathe in sweep.lathes()]).tobytes()
-        ends.setdefault(number, set()).add(last)
+        ends.setdefault((number, samples), set()).add(last)
         return spent
 
     lathes(1).advance(1000)
@@ -259,27 +259,28 @@ def workers(options: Any) -> None:
     }
     for kind, open_ in kinds.items():
         goal = '1.8' if kind == 'Dask' and options.workers == 2 else ''
-        found = []
         with open_() as pool, ThreadPoolExecutor(1) as thread:
             run_everywhere(pool, options.workers)
             for _ in range(3):  # they load what they need
                 lathes(4 * options.workers).advance(1000, executor=pool)
-            for _ in range(rounds):
-                alone, own = swept(thread, count)
-                before = run_everywhere(pool, options.workers)
-                whole, _ = swept(pool, count)
-                after = run_everywhere(pool, options.workers)
-                busiest = max(after[k] - before.get(k, 0.0) for k in after)
-                found.append((alone / whole, own / busiest, gain(pool, options.workers)))
-            by_clock, by_processor, plain = np.median(found, axis=0)
-            what = f'{count} lathes x {samples}: {options.workers} {kind} against a thread'
-            show(what, f'{by_clock:.2f} times', goal)
-            show('  by processor time', f'{by_processor:.2f} times', goal)
-            show('  the same workers, of plain compute', f'{plain:.2f} times')
-            whole, _ = swept(pool, 3 * count)
+            for count, samples in sizes:
+                found = []
+                for _ in range(rounds):
+                    alone, own = swept(thread, count, samples)
+                    before = run_everywhere(pool, options.workers)
+                    whole, _ = swept(pool, count, samples)
+                    after = run_everywhere(pool, options.workers)
+                    busiest = max(after[k] - before.get(k, 0.0) for k in after)
+                    found.append((alone / whole, own / busiest, gain(pool, options.workers)))
+                by_clock, by_processor, plain = np.median(found, axis=0)
+                what = f'{count} lathes x {samples}: {options.workers} {kind} against a thread'
+                show(what, f'{by_clock:.2f} times', goal)
+                show('  by processor time', f'{by_processor:.2f} times', goal)
+                show('  the same workers, of plain compute', f'{plain:.2f} times')
+            whole, _ = swept(pool, 3000, 100_000)
             victim = next(iter(run_everywhere(pool, options.workers)))
             threading.Timer(0.4 * whole, os.kill, (victim, signal.SIGKILL)).start()
-            killed, _ = swept(pool, 3 * count)
+            killed, _ = swept(pool, 3000, 100_000)
             show(
                 f'  of {whole:.0f} s, a worker killed at 40 %',
                 f'{killed / whole:.2f} times',

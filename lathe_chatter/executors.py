@@ -83,18 +83,20 @@ def run_batches(
 ) -> Iterator[Done]:
     """`spread`, each batch as it comes back; no more are out than keep the workers busy."""
     packed = hasattr(executor, '_client')  # Dask would send each array by itself
+    # Dask would also name a task by a hash of its text, which takes longer than sending it.
+    unnamed = {'pure': False} if packed else {}
     waiting = enumerate(map(pickle.dumps, batches) if packed else batches)
     running: dict[Future[tuple[Any, str]], int] = {}
     task, processors = partial(_work, code_identity(), function), set[str]()
     with nullcontext(executor) if executor else futures.ThreadPoolExecutor(cores()) as pool:
         try:
             for place, batch in itertools.islice(waiting, _AHEAD * width_of(pool)):
-                running[pool.submit(task, batch)] = place
+                running[pool.submit(task, batch, **unnamed)] = place
             while running:
                 for future in futures.wait(running, return_when=futures.FIRST_COMPLETED).done:
                     here = running.pop(future)
                     for place, batch in itertools.islice(waiting, 1):
-                        running[pool.submit(task, batch)] = place
+                        running[pool.submit(task, batch, **unnamed)] = place
                     results, processor = future.result()
                     processors.add(processor)
                     results = pickle.loads(results) if packed else results  # noqa: S301 -- ours

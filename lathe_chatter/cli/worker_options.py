@@ -18,6 +18,7 @@ _SETTINGS = {
     'distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_': 2**26,
     'distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_': 2**25,
     'distributed.worker.profile.enabled': False,
+    'distributed.admin.tick.interval': '1s',
     'distributed.admin.large-graph-warning-threshold': '1 GB',
 }
 """Of Dask. As it sets its workers, each block of samples is given back to the system and asked for

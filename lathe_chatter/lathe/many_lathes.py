@@ -12,6 +12,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import spread
+from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut
 from lathe_chatter.model.quantity_fields import count_of
@@ -83,8 +84,10 @@ class LatheSweep:
         wanted = [SAMPLE_COLUMNS.index(name) for name in columns]
         cut_on = partial(_cut_on, samples=samples, wanted=wanted)
         out = np.empty((len(self), samples, len(wanted)))
-        for place, (lathe, block) in enumerate(spread(cut_on, self._lathes, executor=executor)):
-            self._lathes[place], out[place] = lathe, block
+        for place, after in enumerate(spread(cut_on, self._lathes, executor=executor)):
+            lathe = self._lathes[place].lathe
+            lathe.restore(after.state)
+            self._lathes[place], out[place] = _Lathe(lathe, after.last), after.samples
         return out.transpose(1, 0, 2)
 
     def lathes(self) -> list[VirtualLathe]:
@@ -114,8 +117,17 @@ class _Lathe(NamedTuple):
     last: Array
 
 
-def _cut_on(one: _Lathe, samples: int, wanted: list[int]) -> tuple[_Lathe, Array]:
-    """Cut on with one lathe: it, and what is wanted of its samples (n, columns)."""
+class _After(NamedTuple):
+    """Of a lathe that has cut on: what its worker sends back, a third of the lathe itself."""
+
+    state: LatheState
+    last: Array
+    samples: Array
+    """(n, columns wanted)."""
+
+
+def _cut_on(one: _Lathe, samples: int, wanted: list[int]) -> _After:
+    """Cut on with one lathe."""
     lathe, last, done = one.lathe, one.last, 0
     out = np.empty((samples, len(wanted)))
     while done < samples and not lathe.guard:
@@ -125,4 +137,4 @@ def _cut_on(one: _Lathe, samples: int, wanted: list[int]) -> tuple[_Lathe, Array
         if len(block):
             last = block[-1].copy()
     out[done:] = last[wanted]
-    return _Lathe(lathe, last), out
+    return _After(lathe.snapshot(), last, out)

@@ -258,7 +258,9 @@ class VirtualLathe:
                 f'The saved lathe differs from this one in its {" and ".join(others)}: continue '
                 'it as a lathe of its own.'
             )
-        self._begin(state.copy())
+        steps, now = layout.STEPS, self._state
+        same = state.cut == now.cut and state.counts[steps] == now.counts[steps]
+        self._begin(state.copy(), self._flat if same else None)
 
     # -- how ------------------------------------------------------------------------------
 
