@@ -13,6 +13,7 @@ from lathe_chatter.cli.console import INTERRUPTED, Screen
 from lathe_chatter.cli.worker_options import add_executor, executor_of
 from lathe_chatter.dataset import Plan, load_plan, make_dataset
 from lathe_chatter.dataset.generation import make_part, parts_of
+from lathe_chatter.dataset.windows import drawn_machine
 from lathe_chatter.errors import DatasetError
 from lathe_chatter.executors import cores, width_of
 
@@ -36,11 +37,11 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """_Cost, and make or continue."""
+    """Estimate, and make or continue."""
     plan = load_plan(options.plan)
     folder = utf8('--output', options.output or Path(options.plan.stem))
     screen = Screen(json=options.json)
-    for doubt in plan.doubts:
+    for doubt in (*plan.doubts, *drawn_machine(plan, 0).lathe().doubts):
         screen.say(f'WARNING  {doubt}')
     screen.compile()
     if options.workers is None and options.cluster is None:
@@ -84,9 +85,9 @@ def _estimate(plan: Plan) -> _Cost:
     return _Cost(sum(map(len, files.values())) * plan.machines, spent * plan.machines)
 
 
-def _say_cost(plan: Plan, cost: _Cost, workers: int | None, screen: Screen) -> None:
+def _say_cost(plan: Plan, cost: _Cost, workers: int, screen: Screen) -> None:
     """What it will be and take."""
-    seconds = cost.seconds / (workers or 1)
+    seconds = cost.seconds / workers
     long = f'{seconds / 60.0:.0f} min' if seconds > 99.0 else f'{seconds:.0f} s'
     number = f'{workers} workers' if workers != 1 else '1 worker'
     screen.say(

@@ -23,6 +23,7 @@ from lathe_chatter.dataset.windows import DrawnRun, Table, drawn_machine, unit_o
 from lathe_chatter.errors import DatasetError, optional, reason_of
 from lathe_chatter.executors import run_batches
 from lathe_chatter.lathe.change_and_knock_sentences import Knock
+from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.resumable_results import ResultFile
 from lathe_chatter.shipped_files import rendered
@@ -57,6 +58,7 @@ def make_part(plan: Plan, part: tuple[str, range]) -> tuple[Files, dict[str, Any
         'part': part[0],
         'windows': len(table['machine']),
         'stable': int(table['stable'].sum()),
+        'too_fast': sum(bool(doubts(one.setup, one.cut)) for one in machines.values()),
         'ended_early': len(runs) * len(plan.starts) - len(table['machine']),
         'windows_sha256': digest.hexdigest(),
         'files': {n: [len(b), hashlib.sha256(b).hexdigest()] for n, b in files.items()},

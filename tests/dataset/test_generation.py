@@ -147,6 +147,23 @@ def test_machines_of_one_split_are_in_no_other_and_the_card_says_so(tmp_path: Pa
         assert f'| `{name}` |' in card
 
 
+def test_the_card_holds_the_machine_file_and_says_what_the_samples_do_not_show(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slow = 'machine: {machine: chucked_shaft}\nsensors: {sample_rate: 500 Hz}\n'
+    plan = plan_of(tmp_path, slow)
+    assert not cli.main(['dataset', str(tmp_path / 'plan.yaml'), '--output', str(tmp_path / 'd')])
+    assert 'WARNING  The machine vibrates at up to' in capsys.readouterr().out
+    card = (tmp_path / 'd' / generation.CARD).read_text(encoding='utf-8')
+    assert '12 of the machines can vibrate at more than a third of the sample rate' in card
+    (text,) = plan.machine['machine'].values
+    assert text.rstrip() in card
+    enough = TEXT + slow.replace('500', '20000')
+    (tmp_path / 'plan.yaml').write_text(enough, encoding='utf-8')
+    make_dataset(load_plan(tmp_path / 'plan.yaml'), tmp_path / 'e')
+    assert 'third of the sample rate' not in (tmp_path / 'e' / generation.CARD).read_text()
+
+
 @pytest.mark.parametrize('form', ['hdf5', 'zarr'])
 def test_the_same_windows_in_every_form(form: str, tmp_path: Path) -> None:
     pytest.importorskip({'hdf5': 'h5py'}.get(form, form))
