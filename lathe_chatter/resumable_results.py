@@ -10,20 +10,26 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, nullcontext, suppress
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from lathe_chatter.code_identity import code_identity
 from lathe_chatter.errors import ResultFileError, reason_of
 from lathe_chatter.executors import Item, Result, batches_of, run_batches
 
+Entry = TypeVar('Entry')
 
-class ResultFile:
+
+class ResultFile(Generic[Entry]):
     """A file that is begun or continued; what it is written is in it at once.
 
     Args:
         path: Of the file.
-        header: What the results are of; a file with another one is refused.
+        header: What the results are of; a file that begins otherwise is refused, and left as it
+            is.
+        read: What a line holds; it raises a ValueError, KeyError, TypeError or AttributeError of
+            a line that is no result.
 
     Attributes:
         entries: What it held already.
@@ -32,37 +38,51 @@ class ResultFile:
         ResultFileError: If it holds something else, or cannot be written.
     """
 
-    def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: Path, header: Mapping[str, Any], read: Callable[[dict[str, Any]], Entry]
+    ) -> None:
         """See the class."""
         self._path = path
-        self.entries: list[dict[str, Any]] = []
+        self.entries: list[Entry] = []
+        first = _line(header)
         try:
-            whole = path.read_bytes() if path.exists() else b''
-            whole = whole[: whole.rfind(b'\n') + 1]
-            if whole:
-                self.entries = self._known(whole, json.loads(_line(header)))
+            found = path.read_bytes() if path.exists() else b''
+            whole = found[: found.rfind(b'\n') + 1]
+            # Only of a file that is ours a last line that was cut off may go.
+            if not first.startswith(found):
+                self.entries = self._known(whole, json.loads(first), read)
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open('r+b' if path.exists() else 'wb')
-            self._file.truncate(len(whole))  # a last line that was cut off
+            self._file.truncate(len(whole))
             self._file.seek(len(whole))
             if not whole:
-                self._file.write(_line(header))
+                self._file.write(first)
                 self._file.flush()
         except OSError as error:
             raise self._not_written(error) from None
 
-    def _known(self, whole: bytes, header: Mapping[str, Any]) -> list[dict[str, Any]]:
+    def _known(
+        self, whole: bytes, header: Mapping[str, Any], read: Callable[[dict[str, Any]], Entry]
+    ) -> list[Entry]:
+        begun, *lines = whole.splitlines() or [b'']
         try:
-            found, *entries = map(json.loads, whole.splitlines())
+            found = json.loads(begun)
             other = [name for name, value in header.items() if found.get(name) != value]
         except (ValueError, AttributeError):
-            found, entries, other = {}, [], ['kind']
+            found, other = {}, ['kind']
         if other == ['code'] and 'code' in found:
             reason = f'was begun with {found["code"]}, and this is {header["code"]}'
             raise ResultFileError(f'{self._path} {reason}: go on with that, or name another.')
         if other:
             reason = f'holds other results, not of the same {other[0]}'
             raise ResultFileError(f'{self._path} {reason}: name another, or remove it.')
+        entries = list[Entry]()
+        try:
+            for line in lines:
+                entries.append(read(json.loads(line)))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            reason = f'line {len(entries) + 2} of {self._path} is no result as the others are'
+            raise ResultFileError(f'{reason}: remove that line, or name another.') from None
         return entries
 
     def add(self, entry: Mapping[str, Any]) -> None:
@@ -109,9 +129,10 @@ def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
         ResultFileError: If the file is of something else, or cannot be written.
         WorkerError: If workers are lost, or have another version.
     """
-    file = ResultFile(Path(path), {**header, 'code': code_identity()}) if path else None
+    known = {**header, 'code': code_identity()}
+    file = ResultFile(Path(path), known, partial(_result, len(items))) if path else None
     with closing(file) if file else nullcontext():
-        found = {e['place']: e['result'] for e in (file.entries if file else ())}
+        found = dict(file.entries if file else ())
         if found:
             progress(len(found))
         missing = [k for k in range(len(items)) if k not in found]
@@ -124,6 +145,11 @@ def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
                     file.add({'place': place, 'result': result})
             progress(len(done.results))
     return [found[k] for k in range(len(items))]
+
+
+def _result(count: int, entry: dict[str, Any]) -> tuple[int, Any]:
+    """The place of a result among so many, and the result."""
+    return range(count).index(entry['place']), entry['result']
 
 
 def _line(values: Mapping[str, Any]) -> bytes:

@@ -13,7 +13,7 @@ import pytest
 
 from lathe_chatter import resumable_results
 from lathe_chatter.errors import ResultFileError
-from lathe_chatter.resumable_results import ResultFile, spread_into
+from lathe_chatter.resumable_results import spread_into
 
 HEADER = {'kind': 'squares', 'speeds': [1.0, 2.0]}
 
@@ -61,11 +61,51 @@ def test_other_results_are_left_as_they_are(
     with pytest.raises(ResultFileError, match=r'was begun with .* and this is lathe_chatter 9'):
         spread_into(path, HEADER, square, range(3))
     assert path.read_bytes() == before
-    for content in (b'time,x\n0,1\n', b'[]\n', b'\xff\xfe\n'):
-        path.write_bytes(content)
-        with pytest.raises(ResultFileError, match='not of the same kind'):
-            ResultFile(path, HEADER)
-        assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    'content',
+    [
+        b'time,x\n0,1\n',
+        b'[]\n',
+        b'\xff\xfe\n',
+        b'one line of notes',
+        b'0,1\n0,2',
+        b'{"kind": "cub',
+    ],
+)
+def test_a_file_that_does_not_begin_as_its_own_is_left_as_it_is(
+    content: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / 'notes.txt'
+    path.write_bytes(content)
+    with pytest.raises(ResultFileError, match='not of the same kind'):
+        spread_into(path, HEADER, square, range(3))
+    assert path.read_bytes() == content
+
+
+def test_a_first_line_that_was_cut_off_is_written_anew(tmp_path: Path) -> None:
+    path = tmp_path / 'a.jsonl'
+    spread_into(path, HEADER, square, range(3))
+    whole = path.read_bytes()
+    for size in (0, 20, whole.index(b'\n')):
+        path.write_bytes(whole[:size])
+        assert spread_into(path, HEADER, square, range(3)) == [0, 1, 4]
+        assert sorted(path.read_bytes().splitlines()) == sorted(whole.splitlines())
+
+
+@pytest.mark.parametrize(
+    'line', ['{"result": 3}', '{"place": 7, "result": 3}', '{"place": [0]}', '[]', 'x']
+)
+def test_a_line_that_is_no_result_is_named_and_kept(line: str, tmp_path: Path) -> None:
+    path = tmp_path / 'a.jsonl'
+    spread_into(path, HEADER, square, range(3))
+    with path.open('a') as file:
+        file.write(line + '\n')
+    before = path.read_bytes()
+    with pytest.raises(ResultFileError, match=r'^line 5 of .*a\.jsonl is no result as the others'):
+        spread_into(path, HEADER, square, range(3))
+    assert path.read_bytes() == before
 
 
 @contextmanager

@@ -32,6 +32,11 @@ ENDINGS = {Form.PARQUET: '.parquet', Form.HDF5: '.h5', Form.ZARR: '.zarr', Form.
 Files = dict[str, bytes]
 """What a part consists of, by path in its folder; a part that is one file is `.`."""
 MANIFEST, CARD = 'manifest.jsonl', 'README.md'
+_ENTRY = {
+    *('part', 'windows', 'stable', 'too_fast', 'ended_early', 'windows_sha256', 'files'),
+    *('machines', 'processor'),
+}
+"""What a line of the manifest says of a part."""
 _PART_SIZE = 8e6
 """Bytes of a part, where one machine has not more: some seconds of work, and little to lose."""
 
@@ -97,7 +102,7 @@ def make_dataset(
     try:
         if folder.is_dir() and not manifest.exists() and any(folder.iterdir()):
             raise DatasetError(f'{folder} holds other files: give another folder.')
-        with closing(ResultFile(manifest, header)) as file:
+        with closing(ResultFile(manifest, header, _known_part)) as file:
             for left in [*folder.rglob('.*.partial')]:  # by a process that was killed
                 shutil.rmtree(left)
             there = {entry['part']: entry for entry in file.entries if _is_there(folder, entry)}
@@ -119,6 +124,17 @@ def make_dataset(
         said = f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there'
         raise DatasetError(f'{said} is whole, and the same call goes on from it.') from None
     return entries
+
+
+def _known_part(entry: dict[str, Any]) -> dict[str, Any]:
+    """A line of the manifest.
+
+    Raises:
+        ValueError: If it is another.
+    """
+    if entry.keys() != _ENTRY:
+        raise ValueError(entry)
+    return entry
 
 
 def _is_there(folder: Path, entry: dict[str, Any]) -> bool:

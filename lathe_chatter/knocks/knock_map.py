@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
@@ -107,7 +107,7 @@ def read_knock_map(path: Path) -> KnockMap:
     """
     try:
         header, *entries = [json.loads(line) for line in path.read_bytes().split(b'\n')[:-1]]
-        grid, limits = _grid(header), _limits(entries)
+        grid, limits = _grid(header), dict(map(_limit, entries))
     except OSError as error:
         raise ResultFileError(f'{path} cannot be read: {error.strerror}.') from None
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -115,15 +115,12 @@ def read_knock_map(path: Path) -> KnockMap:
     return KnockMap(grid, limits)
 
 
-def _limits(entries: Iterable[dict[str, Any]]) -> dict[Point, KnockLimit]:
-    """The points of a map from its lines."""
-    limits = {}
-    for entry in entries:
-        point = Point(*(entry[name] for name in Point._fields))
-        names = ('impulse', 'survived', 'linear', 'searched', 'amplitude')
-        values = {name: _number(entry[name]) for name in names}
-        limits[point] = KnockLimit(Margin(entry['margin']), trials=entry['trials'], **values)
-    return limits
+def _limit(entry: dict[str, Any]) -> tuple[Point, KnockLimit]:
+    """A point of a map from its line."""
+    point = Point(*(entry[name] for name in Point._fields))
+    names = ('impulse', 'survived', 'linear', 'searched', 'amplitude')
+    values = {name: _number(entry[name]) for name in names}
+    return point, KnockLimit(Margin(entry['margin']), trials=entry['trials'], **values)
 
 
 def _grid(header: dict[str, Any]) -> KnockGrid:
@@ -159,9 +156,9 @@ def run_knock_map(
         WorkerError: If workers are lost, or have another version.
     """
     points = list(grid.points())
-    file = ResultFile(path, grid.header())
+    file = ResultFile(path, grid.header(), _limit)
     with closing(file):
-        done = _limits(file.entries)
+        done = dict(file.entries)
         wanted = [point for point in points if point not in done]
         progress(len(done), len(points))
         # One by one: a point may take seconds, and an interruption loses those in progress.
