@@ -33,14 +33,19 @@ class PulseAngle:
         self._angle = self._speed = self._slope = math.nan
 
     def take(self, time: Array, signal: Array) -> Array:
-        """Angles at samples (n,), rev.
+        """Angles at samples (n,), rev; nan at one that is no number, which is passed over.
 
         Args:
             time: s (n,).
             signal: In any unit (n,).
         """
-        if not np.isfinite(signal).all():
-            return np.full(len(time), np.nan)
+        known = np.isfinite(time) & np.isfinite(signal)
+        angles = np.full(len(time), np.nan)
+        if known.any():
+            angles[known] = self._follow(time[known], signal[known])
+        return angles
+
+    def _follow(self, time: Array, signal: Array) -> Array:
         lows = np.minimum.accumulate(np.r_[self._low, signal])[1:]
         highs = np.maximum.accumulate(np.r_[self._high, signal])[1:]
         self._low, self._high = float(lows[-1]), float(highs[-1])
@@ -64,7 +69,8 @@ class PulseAngle:
     def _pulse(self, now: float) -> None:
         period, self._begun = now - self._begun, now
         self._pulses += 1
-        if self._pulses == 1:
+        if self._pulses == 1 or not period > 0.0:  # the first, or the first after a restart
+            self._pulses = 1
             return
         if self._pulses == 2:
             self._angle, self._speed = 1.0, 1.0 / period
