@@ -252,11 +252,11 @@ class BandDetector:
 
     def _new_margin(self) -> tuple[float, float]:
         cutting, error = self.fit.cutting()
-        now = self._now
-        if now.alarmed or now.holding or not cutting > 2.0 * error:
+        now, stiffness = self._now, float(self._now.stiffness)
+        # What has settled to roundings tells no stiffness, and without one there is no limit.
+        if now.alarmed or now.holding or not (cutting > 2.0 * error and math.isfinite(stiffness)):
             return math.nan, math.nan
         root = complex(now.deeper_root)
-        stiffness = float(now.stiffness)
         limit = cutting_limit(self._mechanics, cutting, stiffness, 1.0 / self.speed, root)
         return limit / cutting - 1.0, limit / cutting * error / cutting
 

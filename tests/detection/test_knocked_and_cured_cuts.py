@@ -84,6 +84,19 @@ def test_the_margin_after_a_cure_is_that_of_the_cut(kind: str, depth: float) -> 
     assert known[-1].margin == pytest.approx(true, rel=0.3)
 
 
+def test_a_cut_without_noise_has_no_margin_once_it_has_settled() -> None:
+    """The shipped scenario, and then a deeper cut: its jump alone moved anything."""
+    cut = Cut(spindle_speed_rpm=3000.0, depth_of_cut=0.00062, bearing_clearance=5e-6)
+    lathe, detector = VirtualLathe(cut=cut), ChatterDetector()
+    _cured(detector, lathe, rpm=3633.0)
+    _listen(detector, lathe, 8.0)
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=_DEPTH))
+    seen = _listen(detector, lathe, 6.0)
+    assert seen[-1].state == 'stable'
+    assert all(each.margin > -0.9 for each in seen if math.isfinite(each.margin))
+    assert math.isnan(seen[-1].margin)
+
+
 def _in_band(signal: Array) -> Array:
     band = butter(4, [60.0, 600.0], 'bandpass', fs=10_000.0, output='sos')
     found: Array = sosfiltfilt(band, signal)
