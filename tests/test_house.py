@@ -48,7 +48,7 @@ ARROWS = {
     'precompile': {'model', 'samples', 'lathe', 'detection', 'stability'},
     'recording': {'model', 'samples', 'lathe', 'stability'},
     'scenario': {'model', 'lathe', 'detection', 'recording'},
-    'listening': {'samples', 'detection', 'recording'},
+    'listening': {'model', 'samples', 'detection', 'recording'},
     'dataset': {'model', 'samples', 'lathe', 'stability', 'scenario'},
     'gym_environment': {'model', 'samples', 'lathe', 'detection'},
     'report': {'model', 'samples', 'lathe', 'stability', 'knocks', 'recording', 'tap_test'},

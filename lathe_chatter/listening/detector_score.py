@@ -122,7 +122,7 @@ def read_labels(path: Path) -> list[Label]:
     """
     found = []
     try:
-        with path.open(encoding='utf-8', newline='') as stream:
+        with path.open(encoding='utf-8-sig', newline='') as stream:
             rows = [row for row in csv.reader(stream) if row]
     except (OSError, ValueError, csv.Error) as error:
         raise SignalFileError(f'{path} cannot be read: {reason_of(error)}.') from None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,15 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LatheChatterError, SignalFileError, optional, reason_of
+from lathe_chatter.model.values_with_units import number_in, units_of
 from lathe_chatter.recording import read_run
+from lathe_chatter.samples.columns import UNITS
 
+Read = Sequence[tuple[str, Array]]
+"""What a file holds: columns in order, each with its name, perhaps with a unit behind it."""
+
+_NAME = re.compile(r'^(.*?)\s*(?:\[(.*)\]|\((.*)\))?$', re.DOTALL)
+"""`name`, `name [unit]` or `name (unit)`."""
 _TIME = 'time'
 _OWN_TIMES = 1e-3
 """By how much times may differ from a rate that is given with them, relative."""
@@ -64,8 +72,8 @@ def read_signals(
     """Read a recording.
 
     Args:
-        path: A WAV, CSV (names in its first line, perhaps with `[unit]`), MAT or Parquet file,
-            or a recorded run.
+        path: A WAV, CSV (names in its first line), MAT or Parquet file, or a recorded run. A unit
+            behind a name, as `tool_displacement [um]`, is converted.
         columns: What its columns or channels are, in order; by default what they are called,
             and `sound` for the first channel of a WAV.
         rate: Samples a second, Hz, where it has no times.
@@ -96,21 +104,35 @@ def read_signals(
     return found
 
 
-def _labelled(
-    path: Path, signals: Mapping[str, Array], columns: Sequence[str] | None, rate: float | None
-) -> Signals:
-    names = list(signals)
+def _named(path: Path, read: Read, columns: Sequence[str] | None) -> dict[str, Array]:
+    """Signals by name, in the units of the samples."""
+    heads = [_NAME.findall(head.strip())[0] for head, _ in read]
+    names = [name for name, _, _ in heads]
     if columns is not None:
-        measured = [name for name in names if name != _TIME or _TIME in columns]
+        measured = [k for k, name in enumerate(names) if name != _TIME or _TIME in columns]
         if len(columns) != len(measured):
             raise SignalFileError(
-                f'{path} has {len(measured)} columns ({", ".join(measured)}), '
+                f'{path} has {len(measured)} columns ({", ".join(names[k] for k in measured)}), '
                 f'and {len(columns)} names were given.'
             )
-        signals = {
-            **({_TIME: signals[_TIME]} if _TIME in signals else {}),
-            **dict(zip(columns, (signals[name] for name in measured), strict=True)),
-        }
+        for k, name in zip(measured, columns, strict=True):
+            names[k] = name
+    for name in names:
+        if names.count(name) > 1:
+            raise SignalFileError(
+                f'{path} has {names.count(name)} columns {name}: give each a name of its own.'
+            )
+    units = [bracketed or in_parentheses for _, bracketed, in_parentheses in heads]
+    return {
+        name: values if name not in UNITS else values * _factor(path, name, unit)
+        for name, unit, (_, values) in zip(names, units, read, strict=True)
+    }
+
+
+def _labelled(
+    path: Path, read: Read, columns: Sequence[str] | None, rate: float | None
+) -> Signals:
+    signals = _named(path, read, columns)
     sizes = {len(values) for values in signals.values()}
     if len(sizes) != 1 or sizes.pop() < 2:
         raise SignalFileError(f'{path} does not hold columns of one length, of 2 samples or more.')
@@ -132,26 +154,42 @@ def _labelled(
     return found
 
 
-def _wav(path: Path) -> dict[str, Array]:
+def _factor(path: Path, name: str, unit: str) -> float:
+    """What makes the unit of a file that of the samples."""
+    factor = number_in(f'1 {unit}', UNITS[name])
+    if factor is None:
+        raise SignalFileError(
+            f'{path} has {name} in {unit}: it must be in {units_of(UNITS[name])}.'
+        )
+    return factor
+
+
+def _wav(path: Path) -> Read:
     from scipy.io import wavfile
 
     rate, data = wavfile.read(path)
-    scale = float(np.iinfo(data.dtype).max) if data.dtype.kind in 'iu' else 1.0
-    channels = np.asarray(data, np.float64).reshape(len(data), -1) / scale
+    middle = 128.0 if data.dtype == np.uint8 else 0.0  # that of 8 bits alone is not 0
+    scale = np.iinfo(data.dtype).max - middle if data.dtype.kind in 'iu' else 1.0
+    channels = (np.asarray(data, np.float64).reshape(len(data), -1) - middle) / scale
     names = ['sound', *(f'channel_{k + 1}' for k in range(1, channels.shape[1]))]
-    signals = dict(zip(names, channels.T, strict=True))
-    return {_TIME: np.arange(len(data)) / rate, **signals}
+    return [(_TIME, np.arange(len(data)) / rate), *zip(names, channels.T, strict=True)]
 
 
-def _csv(path: Path) -> dict[str, Array]:
-    with path.open(encoding='utf-8') as stream:
-        head = next(csv.reader(stream), [])
-        names = [name.partition('[')[0].strip() for name in head]
+def _csv(path: Path) -> Read:
+    with path.open(encoding='utf-8-sig') as stream:
+        names = next(csv.reader(stream), [])
+        if not names:
+            raise SignalFileError(f'{path} has no first line with the names of its columns.')
         table = np.loadtxt(stream, delimiter=',', ndmin=2)
-    return dict(zip(names, table.T, strict=True))
+    table = table if table.size else table.reshape(0, len(names))
+    if len(names) != table.shape[1]:
+        raise SignalFileError(
+            f'{path} has {len(names)} names in its first line, and {table.shape[1]} columns.'
+        )
+    return [*zip(names, table.T, strict=True)]
 
 
-def _mat(path: Path) -> dict[str, Array]:
+def _mat(path: Path) -> Read:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / 'numbers.npz'
         done = subprocess.run(  # noqa: S603 -- ourselves
@@ -163,14 +201,16 @@ def _mat(path: Path) -> dict[str, Array]:
             said = lines[-1] if lines and done.returncode > 0 else 'it is damaged'
             raise SignalFileError(f'{path} cannot be read: {said.rstrip(".")}.')
         with np.load(copy) as arrays:
-            return {n: v for n, v in arrays.items() if v.size > 1}
+            return [(n, v) for n, v in arrays.items() if v.size > 1]
 
 
-def _parquet(path: Path) -> dict[str, Array]:
+def _parquet(path: Path) -> Read:
     parquet: Any = optional('pyarrow.parquet', 'pyarrow')
     table = parquet.read_table(path)
-    return {name: np.asarray(table[name]) for name in table.column_names}
+    units = [(field.metadata or {}).get(b'unit', b'').decode() for field in table.schema]
+    names = [f'{n} [{u}]' if u else n for n, u in zip(table.column_names, units, strict=True)]
+    return [(n, np.asarray(v, np.float64)) for n, v in zip(names, table.columns, strict=True)]
 
 
-def _run(path: Path) -> dict[str, Array]:
-    return dict(read_run(path).samples().columns)
+def _run(path: Path) -> Read:
+    return [*read_run(path).samples().columns.items()]

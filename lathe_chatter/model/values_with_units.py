@@ -35,7 +35,9 @@ UNITS: dict[str, dict[str, float]] = {
     },
     'kg m': {'kg m': 1.0, 'g mm': 1e-6, 'kg mm': 1e-3},
     'N s': {'N s': 1.0, 'kN s': 1e3, 'mN s': 1e-3, 'uN s': 1e-6},
-    's': {'s': 1.0, 'ms': 1e-3, 'min': 60.0},
+    'N': {'N': 1.0, 'mN': 1e-3, 'kN': 1e3},
+    'rev': {'rev': 1.0, 'deg': 1.0 / 360.0, 'rad': 1.0 / _TURN},
+    's': {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'min': 60.0},
     'N/sqrt(Hz)': {'N/sqrt(Hz)': 1.0},
 }  # fmt: skip
 """By the unit of a quantity: what may be written behind a number, and its factor."""

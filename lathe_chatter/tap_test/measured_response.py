@@ -218,6 +218,8 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
         match = re.match(r'\s*(\w+)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*$', cell)
         word, unit = (match[1].lower(), match[2] or '') if match else (f'column {k + 1}', '')
         name = next((known for known in _COLUMNS if known.startswith(word)), word)
+        if name in columns and name in _COLUMNS:
+            raise FrequencyResponseError(f'{path}: its head has two columns {name}: leave one.')
         columns[name], units[name] = k, unit
     parts = ('real', 'imaginary') if 'real' in columns else ('magnitude', 'phase')
     for name in ('frequency', *parts):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from scipy.io import savemat, wavfile
 
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import read_signals
+from lathe_chatter.listening.detector_score import read_labels
 
 SIGNAL = np.sin(np.arange(4000) / 7.0)
 RATE = 8000
@@ -87,3 +89,74 @@ def test_a_mat_file_that_ends_the_process_of_its_reader_is_a_sentence(tmp_path: 
     file.write_bytes(data)
     with pytest.raises(SignalFileError, match='cannot be read: it is damaged'):
         read_signals(file)
+
+
+def test_a_wav_of_8_bits_is_about_nothing(tmp_path: Path) -> None:
+    wavfile.write(tmp_path / 'a.wav', RATE, (128.0 + 100.0 * SIGNAL).round().astype(np.uint8))
+    found = read_signals(tmp_path / 'a.wav').samples[:, 1]
+    np.testing.assert_allclose(found, SIGNAL * 100.0 / 127.0, atol=0.005)
+
+
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig'])
+@pytest.mark.parametrize(
+    'head',
+    [
+        'time [ms],spindle_angle [deg],tool_displacement [um]',
+        ' time (ms), spindle_angle (deg), tool_displacement (µm)',
+    ],
+)
+def test_units_of_a_head_are_converted(head: str, encoding: str, tmp_path: Path) -> None:
+    file = tmp_path / 'a.csv'
+    file.write_text(f'{head}\n0,0,1\n0.125,90,-2\n0.25,180,3\n', encoding=encoding)
+    for columns in (None, ('time', 'spindle_angle', 'tool_displacement')):
+        found = read_signals(file, columns=columns)
+        assert found.columns == ('time', 'spindle_angle', 'tool_displacement')
+        expected = [[0, 0, 1e-6], [125e-6, 0.25, -2e-6], [250e-6, 0.5, 3e-6]]
+        np.testing.assert_allclose(found.samples, expected, rtol=1e-12)
+
+
+def test_a_unit_counts_for_what_its_column_is_said_to_be(tmp_path: Path) -> None:
+    (tmp_path / 'a.csv').write_text('t [s],x1 [mm],mic [Pa]\n0,1,2\n1,3,4\n')
+    columns = ('time', 'tool_displacement', 'sound')
+    found = read_signals(tmp_path / 'a.csv', columns=columns)
+    assert found.samples.tolist() == [[0.0, 0.001, 2.0], [1.0, 0.003, 4.0]]
+
+
+def test_a_parquet_column_tells_its_unit(tmp_path: Path) -> None:
+    arrow = pytest.importorskip('pyarrow')
+    parquet = pytest.importorskip('pyarrow.parquet')
+    fields = [
+        arrow.field('time', arrow.float64()),
+        arrow.field('tool_displacement', arrow.float64(), metadata={'unit': 'um'}),
+    ]
+    table = arrow.table([[0.0, 1.0], [1.0, 3.0]], schema=arrow.schema(fields))
+    parquet.write_table(table, tmp_path / 'a.parquet')
+    found = read_signals(tmp_path / 'a.parquet')
+    np.testing.assert_allclose(found.samples[:, 1], [1e-6, 3e-6], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('content', 'said'),
+    [
+        ('time,tool_displacement [kg]\n0,1\n1,2\n', 'displacement in kg: it must be in m, '),
+        ('time,sound,sound\n0,1,2\n1,2,3\n', 'has 2 columns sound: give each a name of its own'),
+        ('', 'has no first line with the names of its columns'),
+        ('time,sound\n', 'does not hold columns of one length, of 2 samples or more'),
+        ('time,sound\n0,1,2\n1,2,3\n', 'has 2 names in its first line, and 3 columns'),
+    ],
+)  # fmt: skip
+def test_a_table_that_leaves_a_doubt_is_refused(content: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / 'a.csv').write_text(content)
+    with pytest.raises(SignalFileError, match=re.escape(said)):
+        read_signals(tmp_path / 'a.csv')
+
+
+def test_one_name_is_not_given_to_two_columns(tmp_path: Path) -> None:
+    (tmp_path / 'a.csv').write_text('time,a,b\n0,1,2\n1,2,3\n')
+    with pytest.raises(SignalFileError, match='has 2 columns sound'):
+        read_signals(tmp_path / 'a.csv', columns=('sound', 'sound'))
+
+
+def test_labels_of_a_spreadsheet_are_read(tmp_path: Path) -> None:
+    (tmp_path / 'a.csv').write_text('start,end,state\n0,4,stable\n', encoding='utf-8-sig')
+    assert read_labels(tmp_path / 'a.csv') == [(0.0, 4.0, 'stable')]

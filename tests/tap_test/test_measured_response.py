@@ -93,6 +93,7 @@ def test_a_column_without_a_name_is_passed_over(tmp_path: Path) -> None:
         ('frequency (Hz),real (m/N),imaginary (m/N)\n1,2,inf\n', "line 2: 'inf'"),
         ('frequency (rpm),real (m/N),imaginary (m/N)\n1,2,3\n', 'must be in Hz, kHz or rad/s'),
         ('frequency (Hz),real (m/N),imaginary (m/s2/N)\n1,2,3\n', 'in the unit of the real one'),
+        ('freq (Hz),real (m/N),imag (m/N),real (um/N)\n1,2,3,4\n', 'two columns real: leave one'),
         (HEAD + ''.join(f'{30 - k},2,3\n' for k in range(20)), '29 Hz is below'),
         (HEAD + ''.join(f'{k - 5},2,3\n' for k in range(20)), '-5 Hz is below'),
         (HEAD + ''.join(f'{k},0,0\n' for k in range(20)), 'nothing was measured'),
