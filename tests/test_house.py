@@ -33,7 +33,7 @@ BASE = {
         'html_table',
         'plot_style',
     ),
-    *('resumable_results', 'shipped_files'),
+    *('resumable_results', 'shipped_files', 'standard_streams'),
 }
 """What everybody may use: they use nothing but each other."""
 ARROWS = {

@@ -10,10 +10,12 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from types import FrameType
 from typing import Any
 
 from lathe_chatter.nodes.end_signals import raise_lost_interrupts_again
+from lathe_chatter.standard_streams import hold_standard_streams
 
 USER_ERROR = 2
 INTERRUPTED = 130
@@ -27,8 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0, what the verb says (1 for a verdict that is no), 2 for a user's
         mistake, 128 and the number of the signal when interrupted: 130 after Ctrl-C.
     """
+    if 'stdout' in hold_standard_streams():
+        _complain('lathe-chatter: standard output is closed: send it to a file or /dev/null.')
+        return USER_ERROR
     if not _has_working_directory():
-        sys.stderr.write('The working directory is not there any more: change to one that is.\n')
+        _complain('The working directory is not there any more: change to one that is.')
         return USER_ERROR
     received: list[int] = []
     ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -48,18 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         _have_handled(heard, end)
-        from lathe_chatter.cli.verbs import BEGINNING, parser
-
         words = sys.argv[1:] if arguments is None else arguments
-        asked = os.environ.get('COMP_LINE', '') if '_ARGCOMPLETE' in os.environ else ''
-        options, unknown = parser(asked.split() or words).parse_known_args(words)
-        if unknown:  # argparse itself would show how to give a verb, not its options
-            options.usage_of.unknown(unknown)
-        if options.verb is None:
-            sys.stdout.write(BEGINNING)
-            return 0
-        _have_handled(heard, interrupt)
-        code = _carried_out(options)
+        code = _carried_out(words, lambda: _have_handled(heard, interrupt))
     except BaseException as error:
         # Amid an import an interrupt can come out as another error.
         if not received and not isinstance(error, KeyboardInterrupt):
@@ -87,30 +82,60 @@ def _have_handled(numbers: Sequence[int], handler: Callable[[int, Any], None]) -
         signal.signal(number, handler)
 
 
-def _carried_out(options: Any) -> int:
-    """Call a verb; the exit code. A user's mistake is a sentence."""
+def _carried_out(words: Sequence[str], begin: Callable[[], None]) -> int:
+    """Call the verb of a command line; the exit code. A user's mistake is a sentence.
+
+    Args:
+        words: The command line.
+        begin: To call before the verb.
+    """
+    from lathe_chatter.cli.verbs import BEGINNING, parser
     from lathe_chatter.errors import LatheChatterError
 
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, 'reconfigure'):
             stream.reconfigure(errors='replace')  # where the terminal lacks a letter
+    code, who = 0, 'lathe-chatter'
     try:
-        code: int = options.run(options)
+        asked = os.environ.get('COMP_LINE', '') if '_ARGCOMPLETE' in os.environ else ''
+        options, unknown = parser(asked.split() or words).parse_known_args(words)
+        if unknown:  # argparse itself would show how to give a verb, not its options
+            options.usage_of.unknown(unknown)
+        if options.verb is None:
+            sys.stdout.write(BEGINNING)
+        else:
+            who = f'lathe-chatter {options.verb}'
+            begin()
+            code = options.run(options)
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read has enough, as `head` has
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return _BROKEN_PIPE
     except KeyboardInterrupt:
-        sys.stderr.write(f'lathe-chatter {options.verb}: interrupted before it was done.\n')
+        _complain(f'{who}: interrupted before it was done.')
         return INTERRUPTED
     except LatheChatterError as error:
-        sys.stderr.write(f'lathe-chatter {options.verb}: {error}\n')
+        _complain(f'{who}: {error}')
         return USER_ERROR
     except OSError as error:
         where = f'{error.filename}: ' if error.filename else ''
-        sys.stderr.write(f'lathe-chatter {options.verb}: {where}{error.strerror or error}.\n')
+        _complain(f'{who}: {where}{error.strerror or error}.')
+        _print_no_more()
         return USER_ERROR
     return code
+
+
+def _complain(sentence: str) -> None:
+    with suppress(OSError):  # of what cannot be said, nothing can be said
+        sys.stderr.write(f'{sentence}\n')
+
+
+def _print_no_more() -> None:
+    """Have what is still to be printed go nowhere: Python would try, and complain, as it ends."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == '__main__':

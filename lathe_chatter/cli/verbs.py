@@ -7,6 +7,7 @@ the one that is called is imported: some need libraries that take seconds to loa
 from __future__ import annotations
 
 import os
+import sys
 from argparse import Action, ArgumentError, ArgumentParser
 from collections.abc import Sequence
 from importlib import import_module
@@ -51,6 +52,12 @@ Every verb: lathe-chatter --help. One of them: lathe-chatter VERB --help.
 
 class Parser(ArgumentParser):
     """A parser whose complaint is one line, and one that says where the options are told."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print; argparse would pass over what the system refuses."""
+        file = file or sys.stderr
+        file.write(message)
+        file.flush()
 
     def error(self, message: str) -> NoReturn:
         """Complain and end."""

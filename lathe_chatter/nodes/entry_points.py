@@ -11,6 +11,7 @@ import sys
 from importlib import import_module
 
 from lathe_chatter.nodes.end_signals import exit_on_end_signals
+from lathe_chatter.standard_streams import hold_standard_streams
 
 
 def lathe() -> None:
@@ -52,6 +53,7 @@ def no_ros(error: ImportError) -> str:
 
 
 def _run(module: str) -> None:
+    hold_standard_streams()
     exit_on_end_signals()  # until the node, whose imports take a second, hears them itself
     try:
         node = import_module(f'lathe_chatter.nodes.{module}')

@@ -17,6 +17,8 @@ from lathe_chatter.cli.common_options import path_of
 from lathe_chatter.cli.main import main
 from lathe_chatter.cli.verbs import VERBS, Parser, parser
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 def module_of(verb: str) -> Any:
     return import_module(f'lathe_chatter.cli.{verb.replace("-", "_")}')
@@ -303,7 +305,8 @@ class Name:
     def __set_name__(self, owner, name):
         os.kill(os.getpid(), signal.SIGTERM)
 
-def carried_out(options):
+def carried_out(words, begin):
+    begin()
     class Owner:  # as of a library that is imported: Python 3.11 makes a RuntimeError of it
         name = Name()
 
@@ -353,3 +356,53 @@ def test_an_export_whose_name_contradicts_its_format_is_refused(
 ) -> None:
     assert main(['export', 'run', *words]) == 2
     assert f'it must be {allowed}' in capsys.readouterr().err
+
+
+COMMANDS = (
+    (),
+    ('--version',),
+    ('lobes', '--help'),
+    ('verify', str(ROOT / 'tests' / 'golden' / 'run')),
+    ('verify', str(ROOT / 'tests' / 'golden' / 'run'), '--json'),
+)
+
+
+@pytest.mark.parametrize('unbuffered', ['', '1'])
+@pytest.mark.parametrize('output', ['>&-', '> /dev/full'])
+@pytest.mark.parametrize('command', COMMANDS, ids=lambda words: '_'.join(words[:1]) or 'alone')
+def test_an_output_that_takes_nothing_is_a_sentence_and_exit_2(
+    command: tuple[str, ...], output: str, unbuffered: str
+) -> None:
+    words = shlex.join([sys.executable, '-m', 'lathe_chatter.cli', *command])
+    done = subprocess.run(
+        ['sh', '-c', f'{words} {output}'], stderr=subprocess.PIPE, text=True, check=False,
+        env={**os.environ, 'PYTHONUNBUFFERED': unbuffered},
+    )  # fmt: skip
+    assert done.returncode == 2
+    said = 'standard output is closed' if '-' in output else 'No space left on device'
+    sentences = [line for line in done.stderr.splitlines() if line.startswith('lathe-chatter')]
+    assert len(sentences) == 1
+    assert said in sentences[0]
+    if '--json' not in command:  # with which all else goes to standard error
+        assert done.stderr == f'{sentences[0]}\n'
+
+
+def test_where_nothing_can_be_said_the_exit_code_stays() -> None:
+    words = shlex.join([sys.executable, '-m', 'lathe_chatter.cli'])
+    for rest in ('lobes --nonsense', 'verify nowhere', 'report nowhere >&-'):
+        for error in ('2>&-', '2> /dev/full'):
+            done = subprocess.run(['sh', '-c', f'{words} {rest} {error}'], check=False)
+            assert done.returncode == 2, (rest, error)
+
+
+def test_no_file_gets_the_number_of_a_closed_stream() -> None:
+    program = (
+        'from lathe_chatter.standard_streams import hold_standard_streams\n'
+        'closed = hold_standard_streams()\n'
+        'file = open("/dev/null")\n'
+        'raise SystemExit(10 * file.fileno() + len(closed))'
+    )
+    words = shlex.join([sys.executable, '-c', program])
+    for streams, code in (('', 30), ('<&- >&- 2>&-', 33), ('>&-', 31), ('2>&-', 31)):
+        done = subprocess.run(['sh', '-c', f'{words} {streams}'], check=False)
+        assert done.returncode == code, streams
