@@ -21,7 +21,10 @@ _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 def check_metadata(found: Verification) -> None:
     """That metadata.yaml says what is there; of a run that was not finished it may be older."""
     folder = found.run.folder
-    if folder is None or folder.metadata is None or not found.finished:
+    if folder is None or folder.metadata is None:
+        return
+    if not found.finished:
+        _remark_on_its_age(found, folder.metadata)
         return
     try:
         told = _counts(folder.metadata)
@@ -41,6 +44,17 @@ def check_metadata(found: Verification) -> None:
     if len(found.findings) == known:
         for text in _differences(found.run, folder.metadata):
             found.add_loss(f'{FILE_NAME} {text}.')
+
+
+def _remark_on_its_age(found: Verification, metadata: dict[str, Any]) -> None:
+    """Say that it is older than the files: what reads it first says the same of the run."""
+    told, there = metadata.get('message_count'), found.messages.total()
+    live = any(file.being_written for file in found.run.opened)
+    if isinstance(told, int) and told < there and not live:
+        found.remark(
+            f'{FILE_NAME} is older than the files: it counts {told} messages, and {there} are '
+            'there. `lathe-chatter recover` makes a run in which it counts them all.'
+        )
 
 
 def _counts(metadata: dict[str, Any]) -> Counter[str]:

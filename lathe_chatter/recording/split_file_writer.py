@@ -14,7 +14,7 @@ from typing import NamedTuple
 from mcap.records import Channel, Schema
 
 from lathe_chatter.errors import DiskFullError, RunExistsError
-from lathe_chatter.recording.disk_thread import FileSync
+from lathe_chatter.recording.disk_thread import DiskThread, FileSync
 from lathe_chatter.recording.mcap_writer import CommittedFile, Contents
 from lathe_chatter.recording.metadata_yaml import (
     FileCount,
@@ -31,6 +31,8 @@ CLOSED = 'lathe_chatter/closed'
 
 `next` is the file in which the run goes on, empty in the last; `messages` the counts by topic so
 far, as JSON."""
+_RENEWAL_PERIOD = 10.0
+"""s after which metadata.yaml is written anew: what a kill leaves is not much older."""
 
 
 class TopicRecords(NamedTuple):
@@ -154,6 +156,7 @@ class RunFiles:
         self._topics: list[TopicRecords] = []
         self._notes: dict[str, Mapping[str, str]] = {}
         self._described = True
+        self._renewal = DiskThread('metadata.yaml')
         self._open_file()
 
     def add_topic(self, records: TopicRecords) -> None:
@@ -186,8 +189,11 @@ class RunFiles:
             OSError: If the disk refuses; the file stays as the commit before left it.
         """
         self._file.commit()
+        self._renewal.check()
         if not self._described:
             self._describe()
+        elif time.monotonic() - self._described_at >= _RENEWAL_PERIOD:
+            self._renew_description()
         held = self._file.committed
         if held.last - held.first >= self._split_duration * 1e9 or (
             self._file.size >= self._split_size and held.chunks
@@ -232,13 +238,17 @@ class RunFiles:
             for file in self._finished:
                 file.sync.join()
         finally:
-            self._describe()
+            try:
+                self._describe()
+            finally:
+                self._renewal.end()
 
     def abandon(self) -> None:
         """Leave everything as the last commit left it: the disk takes no more."""
         self._file.abandon()
         with contextlib.suppress(OSError):
             self._describe()
+        self._renewal.end()
 
     @property
     def counts(self) -> Counter[str]:
@@ -298,5 +308,13 @@ class RunFiles:
         return dump(values)
 
     def _describe(self) -> None:
-        replace_file(self._folder, self._description())
-        self._described = True
+        """Write metadata.yaml, and wait until the disk has it."""
+        text = self._description()
+        self._renewal.do_now(lambda: replace_file(self._folder, text))
+        self._described, self._described_at = True, time.monotonic()
+
+    def _renew_description(self) -> None:
+        """Write metadata.yaml with what is there by now; a slow disk holds nobody up."""
+        text = self._description()
+        self._renewal.do_later(lambda: replace_file(self._folder, text))
+        self._described_at = time.monotonic()

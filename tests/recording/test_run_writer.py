@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +26,15 @@ from support.recorded import (
 )
 
 from lathe_chatter.errors import DiskFullError, RunExistsError
-from lathe_chatter.recording import RunWriter, Topic, read_run, verify
+from lathe_chatter.recording import (
+    Finding,
+    RunWriter,
+    Topic,
+    read_run,
+    recover,
+    split_file_writer,
+    verify,
+)
 from lathe_chatter.recording.open_chunk import Compression
 
 START = 1_700_000_000_000_000_000
@@ -126,6 +136,48 @@ def test_metadata_is_rosbag2s_from_the_first_moment(tmp_path: Path, numbers: Top
     assert late['duration']['nanoseconds'] == 9_000_000
     described = late['topics_with_message_count'][0]['topic_metadata']
     assert described['type_description_hash'].startswith('RIHS01_')
+
+
+def test_metadata_is_renewed_while_it_is_recorded(
+    tmp_path: Path, numbers: Topic, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(split_file_writer, '_RENEWAL_PERIOD', 0.0)
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.add_topic(numbers)
+        for k in range(3):
+            fill(writer, 10 * k, 10 * (k + 1))
+            writer.commit()
+            while counted(tmp_path / 'run') != 10 * (k + 1):
+                time.sleep(0.01)  # the disk is asked in the background
+
+
+def test_verify_says_of_metadata_that_is_older_than_a_killed_run(
+    tmp_path: Path, numbers: Topic
+) -> None:
+    with RunWriter(tmp_path / 'run') as writer:
+        writer.note('lathe_chatter/made_by', {'lathe_chatter': '0'})
+        writer.add_topic(numbers)
+        fill(writer, 0, 10)
+        writer.commit()
+        fill(writer, 10, 30)
+        writer.commit()
+        said = [finding.text for finding in verify(tmp_path / 'run').findings]
+        assert not [text for text in said if 'older' in text]  # it is being written
+        shutil.copytree(tmp_path / 'run', tmp_path / 'killed')
+    assert counted(tmp_path / 'killed') == 10
+    assert verify(tmp_path / 'killed').findings[-1] == Finding(
+        loss=False,
+        text='metadata.yaml is older than the files: it counts 10 messages, and 30 are there. '
+        '`lathe-chatter recover` makes a run in which it counts them all.',
+    )
+    recover(tmp_path / 'killed', tmp_path / 'saved')
+    assert counted(tmp_path / 'saved') == 30
+
+
+def counted(run: Path) -> int:
+    described = yaml.safe_load((run / 'metadata.yaml').read_text())
+    count: int = described['rosbag2_bagfile_information']['message_count']
+    return count
 
 
 def test_no_run_is_overwritten(tmp_path: Path) -> None:
