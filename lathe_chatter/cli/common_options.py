@@ -31,6 +31,13 @@ def add_run(parser: ArgumentParser) -> None:
     )
 
 
+def add_topic(parser: ArgumentParser) -> None:
+    """Declare which lathe of a recorded run is meant."""
+    parser.add_argument(
+        '--topic', metavar='TOPIC', help='of the samples, where the run has several lathes'
+    )
+
+
 def add_json(parser: ArgumentParser) -> None:
     """Declare that figures may be had as JSON."""
     parser.add_argument(

@@ -6,7 +6,14 @@ import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from lathe_chatter.cli.common_options import PICTURES, add_json, add_run, path_of, utf8
+from lathe_chatter.cli.common_options import (
+    PICTURES,
+    add_json,
+    add_run,
+    add_topic,
+    path_of,
+    utf8,
+)
 from lathe_chatter.cli.console import Screen, writing
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.recording import read_run
@@ -53,7 +60,7 @@ def configure(parser: ArgumentParser) -> None:
         metavar='PATH',
         help='file, or folder of an unrolled run, to make',
     )
-    parser.add_argument('--topic', help='of the samples, where the run has several lathes')
+    add_topic(parser)
     parser.add_argument(
         '--columns', metavar='NAMES', help='signals, with commas between them (default: all)'
     )

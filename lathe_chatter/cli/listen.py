@@ -6,7 +6,14 @@ import math
 from argparse import ArgumentParser, Namespace
 from dataclasses import asdict
 
-from lathe_chatter.cli.common_options import add_force, add_json, in_unit, path_of, picture_file
+from lathe_chatter.cli.common_options import (
+    add_force,
+    add_json,
+    add_topic,
+    in_unit,
+    path_of,
+    picture_file,
+)
 from lathe_chatter.cli.console import Screen, counted, keep_existing, writing
 from lathe_chatter.cli.parameter_options import say_what_is_assumed
 from lathe_chatter.detection import ChatterDetector
@@ -30,6 +37,7 @@ _SPEED = Quantity('a spindle speed', 'rev/min', low=60.0, high=30_000.0, or_zero
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument('recording', type=path_of, metavar='FILE', help='the recording')
+    add_topic(parser)
     parser.add_argument(
         '--columns', metavar='NAMES',
         help='what its columns or channels are, with commas: time, spindle_angle (rev) or '
@@ -70,7 +78,7 @@ def run(options: Namespace) -> int:
     columns = options.columns and [name.strip() for name in options.columns.split(',')]
     rate = None if options.rate is None else _RATE.check('--rate', options.rate)
     labels = [] if options.labels is None else read_labels(options.labels)
-    signals = read_signals(options.recording, columns=columns, rate=rate)
+    signals = read_signals(options.recording, columns=columns, rate=rate, topic=options.topic)
     if signals.remark:
         screen.say(signals.remark)
     sensors = sensors_among(signals.columns)

@@ -7,7 +7,7 @@ import signal
 from argparse import ArgumentParser, Namespace
 from contextlib import suppress
 
-from lathe_chatter.cli.common_options import add_run
+from lathe_chatter.cli.common_options import add_run, add_topic
 from lathe_chatter.cli.console import Screen
 from lathe_chatter.page.recorded_run import RecordedRun
 from lathe_chatter.page.server import PageServer, open_in_browser
@@ -18,6 +18,7 @@ EXAMPLE = 'lathe-chatter page runs/20260401-120000'
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     add_run(parser)
+    add_topic(parser)
     parser.add_argument(
         '--port',
         type=int,
@@ -30,7 +31,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Serve the page until Ctrl-C."""
     screen = Screen()
-    shown = RecordedRun(options.run_path)
+    shown = RecordedRun(options.run_path, options.topic)
     server = PageServer(shown, '127.0.0.1', options.port)
     screen.say(f'{options.run_path} is at {server.url} until Ctrl-C.')
     open_in_browser(server.url)

@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from typing import Any
 
-from lathe_chatter.cli.common_options import add_json, add_run
+from lathe_chatter.cli.common_options import add_json, add_run, add_topic
 from lathe_chatter.cli.console import Screen, counted, writing
 from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
@@ -35,18 +35,30 @@ _ROUNDING = 1e-12
 def configure(parser: ArgumentParser) -> None:
     """Declare the options."""
     add_run(parser)
+    add_topic(parser)
     add_json(parser)
 
 
 def run(options: Namespace) -> int:
     """Report on a run."""
     screen = Screen(json=options.json)
-    screen.json(show_run(read_history(options.run_path), screen))
+    history = read_history(options.run_path, options.topic)
+    picture = PICTURE
+    if options.topic is not None:  # each lathe of a run has its own
+        lathe = options.topic.removesuffix('/samples').replace('/', '_')
+        picture = f'report{lathe}.png'
+    screen.json(show_run(history, screen, picture))
     return 0
 
 
-def show_run(history: History, screen: Screen) -> dict[str, Any]:
-    """Print the table of a run, draw its picture beside it, and return the same as figures."""
+def show_run(history: History, screen: Screen, name: str = PICTURE) -> dict[str, Any]:
+    """Print the table of a run, draw its picture beside it, and return the same as figures.
+
+    Args:
+        history: Of the run.
+        screen: To print on.
+        name: Of the picture.
+    """
     occurrences = _occurrences(history)
     titles = {'time / s': 'right', 'what happened': 'text'}
     titles |= dict.fromkeys(('monitor', 'root, open', 'root, seated'), 'right')
@@ -78,7 +90,7 @@ def show_run(history: History, screen: Screen) -> dict[str, Any]:
         screen.say(sentence)
     excerpts = excerpts_of(history)
     folder = history.path if history.path.is_dir() else history.path.parent
-    picture = folder / PICTURE
+    picture = folder / name
     with writing(picture):
         draw_run(history, excerpts, picture)
     screen.name_file('run', history.path)

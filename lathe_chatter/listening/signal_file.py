@@ -11,13 +11,20 @@ import tempfile
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lathe_chatter.array_types import Array
-from lathe_chatter.errors import LatheChatterError, SignalFileError, optional, reason_of
+from lathe_chatter.errors import (
+    LatheChatterError,
+    ParameterError,
+    SignalFileError,
+    optional,
+    reason_of,
+)
 from lathe_chatter.model.values_with_units import number_in, units_of
 from lathe_chatter.recording import read_run
 from lathe_chatter.samples.columns import UNITS
@@ -67,7 +74,11 @@ class Signals:
 
 
 def read_signals(
-    path: Path | str, *, columns: Sequence[str] | None = None, rate: float | None = None
+    path: Path | str,
+    *,
+    columns: Sequence[str] | None = None,
+    rate: float | None = None,
+    topic: str | None = None,
 ) -> Signals:
     """Read a recording.
 
@@ -77,13 +88,17 @@ def read_signals(
         columns: What its columns or channels are, in order; by default what they are called,
             and `sound` for the first channel of a WAV.
         rate: Samples a second, Hz, where it has no times.
+        topic: Of the samples, where it is a run that has several lathes.
 
     Raises:
         SignalFileError: If it cannot be read, has no times, or others; the sentence says why.
     """
     path = Path(path)
     readers = {'.wav': _wav, '.csv': _csv, '.mat': _mat, '.parquet': _parquet}
-    reader = _run if path.is_dir() else {**readers, '.mcap': _run}.get(path.suffix.lower())
+    is_run = path.is_dir() or path.suffix.lower() == '.mcap'
+    reader = partial(_run, topic=topic) if is_run else readers.get(path.suffix.lower())
+    if topic is not None and not is_run:
+        raise ParameterError('--topic', topic, '', 'left out where the recording is no run')
     if reader is None:
         raise SignalFileError(
             f'{path} is none of {", ".join(readers)}, .mcap or the folder of a run.'
@@ -212,5 +227,5 @@ def _parquet(path: Path) -> Read:
     return [(n, np.asarray(v, np.float64)) for n, v in zip(names, table.columns, strict=True)]
 
 
-def _run(path: Path) -> Read:
-    return [*read_run(path).samples().columns.items()]
+def _run(path: Path, topic: str | None) -> Read:
+    return [*read_run(path).samples(topic).columns.items()]

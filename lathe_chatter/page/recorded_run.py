@@ -46,15 +46,17 @@ class RecordedRun:
 
     Args:
         path: Of the run.
+        topic: Of the samples; may be left out where the run has one lathe.
 
     Raises:
-        RunReadError: If there is no such run, or it has no samples.
+        RunReadError: If there is no such run, it has no samples, or several lathes and no topic
+            is named.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, topic: str | None = None) -> None:
         """Glance at the run; `read` reads it."""
         self._path, self._run = path, read_run(path, damaged=True)
-        self._topic = self._run.samples_topic()
+        self._topic = self._run.samples_topic(topic)
         self._board = Board()
         self._history: History | None = None
         self._chart_of: Any = None
@@ -118,7 +120,7 @@ class RecordedRun:
         """Let all samples pass by, then find out what happened."""
         try:
             await asyncio.to_thread(self._read_all)
-            self._history = await asyncio.to_thread(read_history, self._path)
+            self._history = await asyncio.to_thread(read_history, self._path, self._topic)
             self._show_history(self._history)
         except LatheChatterError as error:
             self._show(float(self._times[-1]), f'What happened cannot be read: {error}')

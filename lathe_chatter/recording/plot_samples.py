@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from lathe_chatter.recording.sample_series import Samples
 
 _USUAL = ('tool_displacement', 'workpiece_displacement')
-_FLAG = 'chatter_monitor/chatter'
 
 
 def plot_samples(samples: Samples, columns: Iterable[str], axes: Axes | None) -> Axes:
@@ -52,13 +51,17 @@ def plot_samples(samples: Samples, columns: Iterable[str], axes: Axes | None) ->
     return axes
 
 
-def plot_run(run: Run, columns: Iterable[str], axes: Axes | None) -> Axes:
+def plot_run(
+    run: Run, columns: Iterable[str], axes: Axes | None, topic: str | None = None
+) -> Axes:
     """The same of a run, with the times at which the monitor flagged chatter shaded."""
-    samples: Any = run.samples()
+    of_samples = run.samples_topic(topic)
+    samples: Any = run.samples(of_samples)
     axes = plot_samples(samples, columns, axes)
-    topic = next((name for name in sorted(run.topics) if name.endswith(_FLAG)), None)
+    flags = (name for name in run.monitor_topics(of_samples) if name.endswith('/chatter'))
+    flag = next(flags, None)
     raised: float | None = None
-    for recorded in run.messages(topic) if topic else ():
+    for recorded in run.messages(flag) if flag else ():
         (time,) = samples.simulated_time([recorded.log_time]).tolist()
         if recorded.message.data and raised is None:
             raised = time

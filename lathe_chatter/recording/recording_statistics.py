@@ -16,7 +16,7 @@ import numpy as np
 
 from lathe_chatter.errors import LayoutError
 from lathe_chatter.recording.cut_log import CutLog, logger_of
-from lathe_chatter.recording.ros_messages import LOG_TYPE, types
+from lathe_chatter.recording.ros_messages import LOG_TYPE, namespace_of, types
 from lathe_chatter.samples.codec import SAMPLES_TYPE, SampleDecoder
 from lathe_chatter.samples.continuity import BlockOrder, missing_in
 from lathe_chatter.samples.mixed_streams import MixedContinuity
@@ -223,9 +223,13 @@ class RunLog:
     def _receive_flag(self, topic: str, up: bool, log_time: int) -> None:  # noqa: FBT001 -- it is one
         if up != self._flag.get(topic, False):
             self._flag[topic] = up
-            of_the_lathe = next(iter(self.samples.values()), None)
-            time = of_the_lathe.time_at(log_time) if of_the_lathe else 0.0
+            time = self._time_beside(topic, log_time)
             self.flags.append((time, topic, up))
+
+    def _time_beside(self, topic: str, log_time: int) -> float:
+        """Simulated time when a message came, s: of the lathe beside its node, or the first."""
+        lathes = sorted(self.samples, key=lambda name: namespace_of(name) != namespace_of(topic))
+        return self.samples[lathes[0]].time_at(log_time) if lathes else 0.0
 
     def _receive_log(self, data: bytes, publish_time: int) -> None:
         message = types().deserialize_cdr(data, LOG_TYPE)

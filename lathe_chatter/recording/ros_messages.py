@@ -24,6 +24,11 @@ def types() -> Any:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
+def namespace_of(topic: str) -> str:
+    """Of the node whose private topic it is: `/cell1` of `/cell1/lathe/samples`."""
+    return topic.rsplit('/', 2)[0]
+
+
 def topic_of_type(name: str, kind: str) -> Topic:
     """A topic of a type that rosbags knows.
 

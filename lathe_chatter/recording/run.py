@@ -18,6 +18,7 @@ from lathe_chatter.recording.dataframes import to_pandas, to_xarray
 from lathe_chatter.recording.decoding import Recorded, decoded
 from lathe_chatter.recording.mcap_chunk_walk import Damage
 from lathe_chatter.recording.recorded_file import Contents, Note, Raw, RecordedFile
+from lathe_chatter.recording.ros_messages import namespace_of
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks, one_cut
 from lathe_chatter.recording.sample_order import sample_blocks
 from lathe_chatter.recording.sample_series import Samples, joined, selection
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ['Raw', 'Recorded', 'Run', 'RunReadError', 'Samples', 'read_run']
 
+MONITOR = 'chatter_monitor/'
+"""In the names of the topics of a monitor."""
 _REST = 'What is left of it can be saved by `lathe-chatter recover`.'
 
 
@@ -172,23 +175,24 @@ class Run:
             raise RunReadError(f'The samples of {name} in {self.path} have no column {names}.')
         return found
 
-    def plot(self, *columns: str, axes: Axes | None = None) -> Axes:
+    def plot(self, *columns: str, axes: Axes | None = None, topic: str | None = None) -> Axes:
         """Plot samples over simulated time, with the times of flagged chatter shaded.
 
         Args:
             columns: Their names, of one unit; by default the displacements.
             axes: To draw into; by default those of a new figure.
+            topic: Of the samples; may be left out where the run has one lathe.
 
         Returns:
             The axes.
 
         Raises:
             ParameterError: If there is no such column, or they have several units.
-            RunReadError: If a file is damaged, or the samples of several lathes are there.
+            RunReadError: If a file is damaged, or there are several lathes and no topic is named.
         """
         from lathe_chatter.recording.plot_samples import plot_run
 
-        return plot_run(self, columns, axes)
+        return plot_run(self, columns, axes, topic)
 
     def __repr__(self) -> str:
         """Where it is, and of how many files."""
@@ -246,22 +250,42 @@ class Run:
         columns: Iterable[str] | None = chosen.get('columns')
         return self.samples(**{**chosen, 'columns': columns and [TIME, *columns]})
 
-    def samples_topic(self) -> str:
-        """The topic of the samples, where the run has one lathe.
+    def samples_topic(self, named: str | None = None) -> str:
+        """The topic of the samples: the one that is named, or that of the one lathe of the run.
 
         Raises:
-            RunReadError: If it has none, or several.
+            RunReadError: If there is none, or several and none is named.
         """
-        names = sorted(
+        names = self._samples_topics()
+        if named is not None:
+            if named not in names:
+                raise self.without_samples(named)
+            return named
+        if not names:
+            raise RunReadError(f'{self.path} holds no samples of a lathe.')
+        if len(names) > 1:
+            listed = ', '.join(names)
+            raise RunReadError(
+                f'{self.path} holds several lathes: name one by its topic, {listed}.'
+            )
+        return names[0]
+
+    def monitor_topics(self, samples: str) -> list[str]:
+        """What a monitor said of a lathe: the one beside it, or else the only one of the run.
+
+        Args:
+            samples: The topic of the samples.
+        """
+        names = sorted(name for name in self.topics if MONITOR in name)
+        beside = [name for name in names if namespace_of(name) == namespace_of(samples)]
+        return beside or (names if len(self._samples_topics()) == 1 else [])
+
+    def _samples_topics(self) -> list[str]:
+        return sorted(
             name
             for name, kind in self.topics.items()
             if name.endswith('/samples') and kind == SAMPLES_TYPE
         )
-        if not names:
-            raise RunReadError(f'{self.path} holds no samples of a lathe.')
-        if len(names) > 1:
-            raise RunReadError(f'{self.path} holds several lathes, {", ".join(names)}: name one.')
-        return names[0]
 
     @cached_property
     def opened(self) -> tuple[RecordedFile, ...]:

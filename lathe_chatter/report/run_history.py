@@ -31,11 +31,11 @@ from lathe_chatter.plot_style import text_of
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence
 from lathe_chatter.recording.recorded_cuts import RecordedCuts, message_of, recorded_cuts
+from lathe_chatter.recording.run import MONITOR
 from lathe_chatter.recording.run_timeline import Placed, blocks_as_written
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.report.plotted_samples import RunSamples
 
-_MONITOR = 'chatter_monitor/'
 _REASONS = {
     BEGINNING: 'the lathe was started again',
     BEGINNING_AGAIN: 'the lathe was reset',
@@ -255,15 +255,21 @@ def _cut_short(ramp: Ramp, time: float) -> Ramp:
     return ramp._replace(end=time, high=ramp.low + share * (ramp.high - ramp.low))
 
 
-def read_history(path: Path) -> History:
+def read_history(path: Path, topic: str | None = None) -> History:
     """Read what happened in a recorded run.
 
+    Args:
+        path: Of the run.
+        topic: Of the samples; may be left out where the run has one lathe.
+
     Raises:
-        RunReadError: If there is no such run, or it has no samples.
+        RunReadError: If there is no such run, it has no samples, or several lathes and no topic
+            is named.
     """
     run = read_run(path)
-    topic = run.samples_topic()
-    cuts = recorded_cuts(run, topic.removesuffix('/samples'), lambda name: _MONITOR in name)
+    topic = run.samples_topic(topic)
+    monitors = run.monitor_topics(topic)
+    cuts = recorded_cuts(run, topic.removesuffix('/samples'), lambda name: name in monitors)
     if not cuts.sampled:
         raise run.without_samples(topic)
     sessions = _sessions(cuts)
@@ -368,7 +374,7 @@ class _Dated:
         return flags
 
     def _of(self, name: str) -> list[Placed]:
-        return [each for each in self._cuts.messages if each.raw.topic.endswith(_MONITOR + name)]
+        return [each for each in self._cuts.messages if each.raw.topic.endswith(MONITOR + name)]
 
     def _time(self, found: Placed) -> float:
         received, _ = self._cuts.timeline.steady(found)

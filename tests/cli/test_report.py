@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
+from support.two_lathes import FLAGS, record_two_lathes
 
+from lathe_chatter.cli.main import main
 from lathe_chatter.cli.report import _advice
 
 
@@ -18,3 +23,20 @@ def test_the_speed_that_was_set_is_among_the_advice() -> None:
         changes=[SimpleNamespace(time=7.0, new={'spindle_speed_rpm': 3633.0})],
     )
     assert [f'{speed:.0f}' for _, speed in _advice(history)] == ['3635', '3633']
+
+
+def test_each_lathe_of_a_run_has_a_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = record_two_lathes(tmp_path)
+    assert main(['report', str(run)]) == 2
+    for topic in ('/left/lathe/samples', '/right/lathe/samples'):
+        assert topic in capsys.readouterr().err
+        assert main(['report', str(run), '--topic', topic, '--json']) == 0
+        found = json.loads(capsys.readouterr().out)
+        cell = topic.split('/')[1]
+        flags = [e['time'] for e in found['occurrences'] if e['what'] == 'chatter flagged']
+        assert flags == [pytest.approx(0.02 * (FLAGS[cell] + 1))]
+        assert Path(found['picture']).is_file()
+        assert main(['report', str(run), '--topic', '/other/lathe/samples']) == 2
+    assert len([*run.glob('*.png')]) == 2

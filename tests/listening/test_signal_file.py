@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
+from support.two_lathes import record_two_lathes
 
-from lathe_chatter.errors import SignalFileError
+from lathe_chatter.errors import ParameterError, RunReadError, SignalFileError
 from lathe_chatter.listening import read_signals
 from lathe_chatter.listening.detector_score import read_labels
 
@@ -160,3 +161,14 @@ def test_one_name_is_not_given_to_two_columns(tmp_path: Path) -> None:
 def test_labels_of_a_spreadsheet_are_read(tmp_path: Path) -> None:
     (tmp_path / 'a.csv').write_text('start,end,state\n0,4,stable\n', encoding='utf-8-sig')
     assert read_labels(tmp_path / 'a.csv') == [(0.0, 4.0, 'stable')]
+
+
+def test_of_a_run_with_two_lathes_one_is_heard(tmp_path: Path) -> None:
+    run = record_two_lathes(tmp_path)
+    with pytest.raises(RunReadError, match='name one by its topic'):
+        read_signals(run)
+    heard = [read_signals(run, topic=f'/{cell}/lathe/samples') for cell in ('left', 'right')]
+    assert not np.array_equal(heard[0].samples, heard[1].samples)
+    write_wav(file := tmp_path / 'a.wav')
+    with pytest.raises(ParameterError, match=r'must be left out where the recording is no run'):
+        read_signals(file, topic='/left/lathe/samples')

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.browser import Browser, chromium
+from support.two_lathes import FLAGS, record_two_lathes
 
 from lathe_chatter.cli.main import main
 from lathe_chatter.errors import RunReadError
@@ -128,6 +129,17 @@ def test_sessions_follow_each_other_and_what_is_missing_stays_open(tmp_path: Pat
     time, place = first.columns['time'][restart:], first.columns[SIGNALS[0]][restart:]
     expected = place[(time >= 0.2 - 1e-9) & (time <= 0.21 + 1e-9)]
     np.testing.assert_allclose(columns(arrays)[0][:, 0], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize('cell', FLAGS)
+def test_one_lathe_of_several_is_shown(cell: str, tmp_path: Path) -> None:
+    folder = record_two_lathes(tmp_path)
+    with pytest.raises(RunReadError, match='name one by its topic'):
+        RecordedRun(folder)
+    shown = RecordedRun(folder, f'/{cell}/lathe/samples')
+    asyncio.run(shown.read())
+    ((begin, _),) = look(shown, do='at', time=0.9)[0]['page']['flags']
+    assert begin == pytest.approx(0.02 * (FLAGS[cell] + 1))
 
 
 def test_what_is_no_run_is_a_sentence(tmp_path: Path) -> None:

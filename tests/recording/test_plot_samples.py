@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from support.two_lathes import FLAGS, record_two_lathes
 
 import lathe_chatter as lc
 from lathe_chatter.errors import ParameterError
@@ -66,3 +67,13 @@ def test_both_show_themselves_in_a_line() -> None:
     assert '/lathe/samples' in run._repr_html_()
     empty = lc.Samples({'time': np.zeros(0)}, np.zeros(0, np.int64), np.zeros(0), [], [])
     assert repr(empty) == '<Samples: 0 of time>'
+
+
+@pytest.mark.parametrize('cell', FLAGS)
+def test_each_lathe_of_a_run_is_plotted_with_its_own_flag(cell: str, tmp_path: Path) -> None:
+    run = lc.read_run(record_two_lathes(tmp_path))
+    axes = run.plot(axes=Figure().subplots(), topic=f'/{cell}/lathe/samples')
+    (shade,) = axes.patches
+    assert shade.get_extents().transformed(axes.transData.inverted()).x0 == pytest.approx(
+        0.02 * (FLAGS[cell] + 1)
+    )

@@ -60,7 +60,10 @@ def test_other_topics_are_dated_by_the_samples_about_them(
 def test_two_lathes_must_be_told_apart(tmp_path: Path, blocks: list[Array]) -> None:
     record(tmp_path / 'run', blocks[:4], lathes=('/a/lathe', '/b/lathe'))
     run = read_run(tmp_path / 'run')
-    with pytest.raises(RunReadError, match=r'several lathes, /a/lathe/samples, /b/lathe/samples'):
+    with pytest.raises(
+        RunReadError,
+        match=r'several lathes: name one by its topic, /a/lathe/samples, /b/lathe/samples',
+    ):
         run.samples()
     assert len(run.samples('/b/lathe/samples').columns['time']) == 80
 

@@ -13,8 +13,8 @@ from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING, change_sen
 from lathe_chatter.model import Cut
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, read_run
-from lathe_chatter.recording.recording_statistics import RunLog
-from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes
+from lathe_chatter.recording.recording_statistics import FLAG_TYPE, RunLog
+from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, message_bytes
 from lathe_chatter.recording.run_summary import SUMMARY, closing_summary
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
@@ -111,3 +111,17 @@ def test_a_message_that_is_no_block_is_told_and_harms_nothing() -> None:
     receive(run_log, lathe, at=3)
     assert run_log.samples['/lathe/samples'].continuity.samples == 40
     assert run_log.messages['/lathe/samples'] == 4
+
+
+@pytest.mark.parametrize(('cell', 'expected'), [('left', 0.08), ('right', 0.02)])
+def test_a_flag_has_the_time_of_the_lathe_beside_its_monitor(cell: str, expected: float) -> None:
+    run_log, lathe = RunLog(), VirtualLathe()
+    blocks = [encode_block(lathe.advance(20)) for _ in range(40)]
+    for k in range(10):  # the other has cut for long
+        run_log.receive('/left/lathe/samples', SAMPLES_TYPE, blocks[30 + k], k * TICK, k * TICK)
+        run_log.receive('/right/lathe/samples', SAMPLES_TYPE, blocks[k], k * TICK, k * TICK)
+    topic = f'/{cell}/chatter_monitor/chatter'
+    raised = message_bytes(FLAG_TYPE, data=True)
+    run_log.receive(topic, FLAG_TYPE, raised, 9 * TICK, 9 * TICK)
+    ((time, _, _),) = run_log.flags
+    assert time == pytest.approx(expected)
