@@ -122,6 +122,7 @@ class TopicWatch:
         self.paused = False
         self._former: dict[str, dict[str, int]] = {}
         self._met: dict[str, set[tuple[int, ...]]] = {}
+        self._several: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._look_closely, self._warned = 0.0, False
         self._since, self._began = time.time_ns(), time.monotonic()
@@ -145,7 +146,6 @@ class TopicWatch:
             self._counts[name] = count
             offers = self._node.get_publishers_info_by_topic(name)
             met = self._met.setdefault(name, set())
-            known = len(met)
             met.update(tuple(offer.endpoint_gid) for offer in offers)
             topic = self.topics.get(name)
             if topic is not None and topic.is_of(offers):
@@ -155,9 +155,10 @@ class TopicWatch:
                 self._join(name, offers)
             for offer in offers:
                 on_publisher(offer.node_namespace, offer.node_name)
-            if len(met) > known:
-                counts = {each: str(len(those)) for each, those in self._met.items() if those}
-                self._sink.note(PUBLISHERS, counts)
+        several = {name: str(len(met)) for name, met in self._met.items() if len(met) > 1}
+        if several != self._several:
+            self._several = several
+            self._sink.note(PUBLISHERS, several)
         if closely and time.monotonic() >= self._began + _EXPECTED:
             self._await()
 

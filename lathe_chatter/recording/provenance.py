@@ -31,7 +31,8 @@ RECEPTION = 'lathe_chatter/reception'
 """Name of the record of what came and what was lost on the way, by topic, as JSON."""
 
 PUBLISHERS = 'lathe_chatter/publishers'
-"""Name of the record of how many publishers each topic had, one after another too, as JSON."""
+"""Name of the record of how many publishers a topic had, one after another too, as JSON; of one
+that had several, for where it is not told a topic had one."""
 
 STALLS = 'stalls'
 """Among these, how often the recorder took too long to take what had come."""

@@ -29,6 +29,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.recorder_node import RecorderNode
 from lathe_chatter.recording import read_run, verify
+from lathe_chatter.recording.provenance import CHECK, PUBLISHERS
 from lathe_chatter.recording.run_summary import SUMMARY
 from lathe_chatter.samples.codec import encode_block
 
@@ -193,7 +194,8 @@ def test_publishers_that_share_a_topic_lose_nothing(
     first = bench.node.create_publisher(Float64, '/n', KEPT)
     for k in range(20):
         first.publish(Float64(data=float(k)))
-    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n', '/alone'])
+    bench.talk(Float64, '/alone').publish(Float64(data=0.0))
     spin_until(lambda: recorder.messages_of('/n') == 20, 'the messages of the first')
     second = bench.node.create_publisher(Float64, '/n', KEPT)
     for k in range(40):
@@ -202,6 +204,8 @@ def test_publishers_that_share_a_topic_lose_nothing(
     recorder.stop()
     assert recorder.lost_of('/n') == 0
     assert verify(tmp_path / 'run').complete
+    (noted,) = (n.values for n in read_run(tmp_path / 'run').notes() if n.name == PUBLISHERS)
+    assert {name: count for name, count in noted.items() if name != CHECK} == {'/n': '2'}
 
 
 def test_the_run_knows_who_made_it_and_the_parameters_of_the_lathe(
