@@ -12,11 +12,12 @@ from lathe_chatter.cli.common_options import add_json, add_run, add_topic
 from lathe_chatter.cli.console import Screen, counted, writing
 from lathe_chatter.lathe.change_and_knock_sentences import on_the_shop_floor
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.report.monitor_record import Flag
 from lathe_chatter.report.operating_points import probabilities_of
 from lathe_chatter.report.probability_chart import cut_probability, probability_sentence
 from lathe_chatter.report.run_excerpts import Excerpt, excerpts_of
 from lathe_chatter.report.run_figure import draw_run
-from lathe_chatter.report.run_history import Flag, History, Session, in_words, read_history
+from lathe_chatter.report.run_history import History, Session, in_words, read_history
 from lathe_chatter.stability import root_of
 
 EXAMPLE = 'lathe-chatter report runs/20260401-120000'
@@ -162,9 +163,9 @@ def _occurrences(history: History) -> list[dict[str, Any]]:
         if isinstance(event, Flag) and event.chatter:
             ends = [end for start, end in spans if start == event.time]
             ends += [change.time for change in history.changes if change.time > event.time]
-            until = min(ends, default=event.time)  # what comes after is another cut
+            until = min(ends, default=event.received)  # what comes after is another cut
             for name in ('frequency', 'growth_rate'):
-                settled = history.settled(name, event.time, until)
+                settled = history.settled(name, event.received, until)
                 entry[name] = settled if math.isfinite(settled) else getattr(event, name)
         result.append(entry)
     result += [
@@ -186,8 +187,8 @@ def _advice(history: History) -> Iterator[tuple[float, float]]:
     At first, where it changed, and the last before the spindle was set, which may have been to it.
     """
     recommended = history.estimates.get('recommended_speed_rpm')
-    turns = [flag.time for flag in history.flags]
-    raised = [flag.time for flag in history.flags if flag.chatter]
+    turns = [flag.received for flag in history.flags]
+    raised = [flag for flag in history.flags if flag.chatter]
     last, last_turn = math.nan, -1
     sets = [change.time for change in history.changes if 'spindle_speed_rpm' in change.new]
     told = [] if recommended is None else recommended.T.tolist()
@@ -195,9 +196,9 @@ def _advice(history: History) -> Iterator[tuple[float, float]]:
     for (time, speed), until in zip(told, following, strict=False):
         was_set = f'{speed:.0f}' != f'{last:.0f}' and any(time < at <= until for at in sets)
         # The figures that explain a flag are published before it.
-        after = next((flag for flag in raised if time <= flag < time + _EXPLAINS), None)
-        time = time if after is None else after  # noqa: PLW2901 -- when it was of use
-        turn = bisect.bisect_right(turns, time)
+        after = next((f for f in raised if time <= f.received < time + _EXPLAINS), None)
+        turn = bisect.bisect_right(turns, time if after is None else after.received)
+        time = time if after is None else after.time  # noqa: PLW2901 -- when it was of use
         if turn != last_turn or was_set or not abs(speed / last - 1.0) <= _SAME_SPEED:
             yield time, speed
             last, last_turn = speed, turn

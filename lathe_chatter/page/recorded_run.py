@@ -24,8 +24,9 @@ from lathe_chatter.recording import read_run
 from lathe_chatter.recording.chunk_messages import messages_of
 from lathe_chatter.recording.mcap_chunk_walk import Chunk, record_at
 from lathe_chatter.recording.recorded_file import RecordedFile
+from lathe_chatter.report.monitor_record import value_near
 from lathe_chatter.report.operating_points import stays_of
-from lathe_chatter.report.run_history import History, in_words, read_history, value_near
+from lathe_chatter.report.run_history import History, in_words, read_history
 from lathe_chatter.samples.codec import SampleDecoder
 
 COLUMNS = ('time', 'spindle_angle', *SIGNALS)

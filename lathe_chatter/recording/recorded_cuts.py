@@ -16,7 +16,7 @@ from lathe_chatter.recording.provenance import PARAMETERS, parameter_history
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import Placed, Timeline, read_timeline
 
-_LOG, _EVENTS = '/rosout', '/parameter_events'
+LOG, _EVENTS = '/rosout', '/parameter_events'
 _KINDS = {1: 'bool_value', 2: 'integer_value', 3: 'double_value', 4: 'string_value'}
 _LATE = 1_000_000_000
 """ns by which samples are before the lathe says that it begins, where they are of another."""
@@ -69,17 +69,17 @@ def recorded_cuts(
         LayoutError: If a message is no block of samples.
     """
     timeline, found = read_timeline(
-        run, f'{lathe}/samples', lambda topic: topic in (_LOG, _EVENTS) or others(topic)
+        run, f'{lathe}/samples', lambda topic: topic in (LOG, _EVENTS) or others(topic)
     )
     if math.isfinite(mixed := timeline.mixed_at):
         raise MixedSamplesError(f'{lathe}/samples', mixed)
     log, announced = CutLog(), []
     for each in found:
-        if each.raw.topic not in (_LOG, _EVENTS):
+        if each.raw.topic not in (LOG, _EVENTS):
             continue
         message = message_of(each)
         _, published = timeline.steady(each)
-        if each.raw.topic == _LOG and message.name == logger_of(lathe):
+        if each.raw.topic == LOG and message.name == logger_of(lathe):
             log.receive(message.msg, published)
         elif each.raw.topic == _EVENTS and message.node == lathe:
             announced.append((_declared(message), published))

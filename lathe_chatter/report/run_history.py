@@ -30,10 +30,10 @@ from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.plot_style import text_of
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence
-from lathe_chatter.recording.recorded_cuts import RecordedCuts, message_of, recorded_cuts
-from lathe_chatter.recording.run import MONITOR
-from lathe_chatter.recording.run_timeline import Placed, blocks_as_written
+from lathe_chatter.recording.recorded_cuts import LOG, RecordedCuts, recorded_cuts
+from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
+from lathe_chatter.report.monitor_record import Flag, MonitorRecord
 from lathe_chatter.report.plotted_samples import RunSamples
 
 _REASONS = {
@@ -43,25 +43,6 @@ _REASONS = {
 }
 """Why a session but the first begins, by the sentence of its beginning."""
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
-
-
-@dataclass(frozen=True)
-class Flag:
-    """The monitor's flag rising (or falling), with its estimates about then.
-
-    Attributes:
-        time: Simulated time, s.
-        chatter: What the flag said.
-        frequency: Hz, nan where unknown.
-        growth_rate: 1/s, nan where unknown.
-        started: Whether the monitor was started anew: its flag says nothing of before.
-    """
-
-    time: float
-    chatter: bool
-    frequency: float = float('nan')
-    growth_rate: float = float('nan')
-    started: bool = False
 
 
 class Ramp(NamedTuple):
@@ -268,13 +249,13 @@ def read_history(path: Path, topic: str | None = None) -> History:
     """
     run = read_run(path)
     topic = run.samples_topic(topic)
-    monitors = run.monitor_topics(topic)
-    cuts = recorded_cuts(run, topic.removesuffix('/samples'), lambda name: name in monitors)
+    wanted = {*run.monitor_topics(topic), LOG}
+    cuts = recorded_cuts(run, topic.removesuffix('/samples'), lambda name: name in wanted)
     if not cuts.sampled:
         raise run.without_samples(topic)
     sessions = _sessions(cuts)
-    dated = _Dated(cuts, sessions)
-    estimates = {name: dated.series(name) for name in _ESTIMATES}
+    monitor = MonitorRecord(cuts, [session.time for session in sessions])
+    estimates = {name: monitor.series(name) for name in _ESTIMATES}
     told = [
         [replace(event, time=event.time + session.time) for event in recorded.events]
         for session, recorded in zip(sessions, cuts.sampled, strict=True)
@@ -292,7 +273,7 @@ def read_history(path: Path, topic: str | None = None) -> History:
         samples=RunSamples(lambda: _on_one_axis(run, topic, cuts, sessions)),
         changes=[event for event in events if isinstance(event, Change)],
         knocks=[event for event in events if isinstance(event, Knock)],
-        flags=dated.flags(estimates),
+        flags=monitor.flags(estimates),
         estimates=estimates,
         tool_leaves_cut=first.tool_leaves_cut,
         spindle_acceleration=first.spindle_acceleration,
@@ -340,49 +321,6 @@ def _on_one_axis(
         yield blocks._replace(signals=signals)
 
 
-class _Dated:
-    """What the monitor said, by the times of the sessions."""
-
-    def __init__(self, cuts: RecordedCuts, sessions: list[Session]) -> None:
-        self._cuts = cuts
-        self._times = {id(c): s.time for c, s in zip(cuts.sampled, sessions, strict=True)}
-
-    def series(self, name: str) -> Array:
-        """A figure over time (2, m)."""
-        found = self._of(name)
-        values = [message_of(each).data for each in found]
-        return np.array([[self._time(each) for each in found], values], dtype=float)
-
-    def flags(self, estimates: dict[str, Array]) -> list[Flag]:
-        """Every change of the flag, and where a monitor was started anew, with its flag down."""
-        flags: list[Flag] = []
-        up, numbers = False, dict[str, tuple[int, int]]()
-        for each in self._of('chatter'):
-            raw, chatter = each.raw, bool(message_of(each).data)
-            # A file that begins with a message of the one before has it once more, as it was.
-            number, published = numbers.get(raw.topic, (0, 0))
-            numbers[raw.topic] = raw.sequence, raw.publish_time
-            if 0 < raw.sequence <= number and raw.publish_time != published:
-                up = False
-                flags.append(Flag(self._time(each), chatter=False, started=True))
-            if chatter == up:
-                continue
-            up, time = chatter, self._time(each)
-            at = (value_near(estimates[name], time) for name in ('frequency', 'growth_rate'))
-            frequency, growth_rate = at
-            flags.append(Flag(time, up, frequency, growth_rate))
-        return flags
-
-    def _of(self, name: str) -> list[Placed]:
-        return [each for each in self._cuts.messages if each.raw.topic.endswith(MONITOR + name)]
-
-    def _time(self, found: Placed) -> float:
-        received, _ = self._cuts.timeline.steady(found)
-        session = self._cuts.session_at(received)
-        time = self._cuts.timeline.simulated_time(received, session.blocks)
-        return self._times[id(session)] + time
-
-
 def _remarks(cuts: RecordedCuts) -> list[str]:
     """Steps of the clock, what does not fit, and lathes that left no sample."""
     remarks = [
@@ -395,10 +333,3 @@ def _remarks(cuts: RecordedCuts) -> list[str]:
         times = 'Once' if len(lost) == 1 else f'{len(lost)} times'
         remarks.append(f'{times} the lathe began, and no sample of it is in the record.')
     return remarks
-
-
-def value_near(series: Array, time: float) -> float:
-    """The value of an estimate (2, m) nearest to a time, nan where there is none."""
-    if series.shape[1] == 0:
-        return math.nan
-    return float(series[1, np.argmin(np.abs(series[0] - time))])

@@ -24,6 +24,7 @@ from lathe_chatter.model.lathe_parameter_table import machine_in_cut
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.monitor_sentences import SENTENCES, clearance, details, onset
+from lathe_chatter.report.monitor_record import DECIDED
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
 
@@ -263,6 +264,15 @@ def test_only_what_surely_grows_is_said_to_grow(growth: float, words: str) -> No
         1.0, 'chatter', chatter=True, growth_rate=growth, growth_rate_error=1.5, amplitude=1e-6
     )
     assert onset(estimate) == f'At 1.000000 s: chatter {words}, amplitude 1 um.'
+
+
+def test_a_report_reads_when_the_flag_was_decided() -> None:
+    """The core knows these sentences without the nodes."""
+    for said, up in ((onset(Estimate(1.25, 'chatter', chatter=True)), 'chatter'),
+                     *((clearance(Estimate(1.25, state)), None) for state in STATES)):  # fmt: skip
+        told = DECIDED.match(said)
+        assert told is not None
+        assert (told['time'], told['up']) == ('1.250000', up)
 
 
 def test_that_chatter_is_over_reads_well_whatever_the_state() -> None:
