@@ -95,6 +95,19 @@ class RunReadError(LatheChatterError):
     """A path that holds no run that can be read; the text says why."""
 
 
+class NothingSavedError(RunReadError):
+    """Nothing of a damaged run could be saved.
+
+    Attributes:
+        damage: What could not be read, as sentences.
+    """
+
+    def __init__(self, path: Path, damage: list[str]) -> None:
+        """Name the run."""
+        self.damage = damage
+        super().__init__(f'nothing of {path} could be saved')
+
+
 class MixedSamplesError(RunReadError):
     """The samples of several lathes are mixed in one topic, and are no cut of one lathe."""
 

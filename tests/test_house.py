@@ -26,6 +26,7 @@ LONGEST = 400
 BASE = {
     *(
         'array_types',
+        'atomic_output',
         'code_identity',
         'compiled',
         'errors',

@@ -60,6 +60,18 @@ def in_unit(unit: str) -> Callable[[str], object]:
     return parsed
 
 
+def names_in(option: str, text: str) -> tuple[str, ...]:
+    """Names with commas between them.
+
+    Raises:
+        ParameterError: If one of them is empty.
+    """
+    names = tuple(name.strip() for name in text.split(','))
+    if not all(names):
+        raise ParameterError(option, text, '', 'names with commas between them')
+    return names
+
+
 def add_force(parser: ArgumentParser) -> None:
     """Declare that files which exist may be overwritten."""
     parser.add_argument('--force', action='store_true', help='overwrite files that exist')

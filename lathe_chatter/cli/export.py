@@ -11,6 +11,7 @@ from lathe_chatter.cli.common_options import (
     add_json,
     add_run,
     add_topic,
+    names_in,
     path_of,
     utf8,
 )
@@ -75,14 +76,12 @@ def run(options: Namespace) -> int:
     source: Path = options.run_path
     suffix = '-unrolled' if options.unrolled else _OF_FORMAT[form][0]
     path = options.output or source.with_name(f'{source.stem}{suffix}')
-    columns = None
-    if options.columns is not None:
-        columns = tuple(name.strip() for name in options.columns.split(','))
+    columns = None if options.columns is None else names_in('--columns', options.columns)
     chosen = Selection(options.topic, columns, options.start, options.end)
-    if path.suffix in _ENDINGS and path.suffix not in _OF_FORMAT.get(form, ()):
+    if options.unrolled and path.suffix in _ENDINGS:
+        raise ParameterError('--output', str(path), '', 'the name of a folder')
+    if not options.unrolled and path.suffix not in _OF_FORMAT[form]:
         allowed = f'a name that ends in {suffix}, as --format {form} is written'
-        if options.unrolled:
-            allowed = 'the name of a folder'
         raise ParameterError('--output', str(path), '', allowed)
     if form != 'csv':
         utf8('--output', path)

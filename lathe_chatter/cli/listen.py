@@ -11,6 +11,7 @@ from lathe_chatter.cli.common_options import (
     add_json,
     add_topic,
     in_unit,
+    names_in,
     path_of,
     picture_file,
 )
@@ -75,7 +76,7 @@ def run(options: Namespace) -> int:
     screen = Screen(json=options.json)
     if options.output is not None:
         keep_existing(*files_of_picture(picture_file(options.output)), force=options.force)
-    columns = options.columns and [name.strip() for name in options.columns.split(',')]
+    columns = None if options.columns is None else names_in('--columns', options.columns)
     rate = None if options.rate is None else _RATE.check('--rate', options.rate)
     labels = [] if options.labels is None else read_labels(options.labels)
     signals = read_signals(options.recording, columns=columns, rate=rate, topic=options.topic)

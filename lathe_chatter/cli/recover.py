@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections import Counter
 from pathlib import Path
 
 from lathe_chatter.cli.common_options import add_json, add_run, path_of, utf8
 from lathe_chatter.cli.console import Screen, writing
+from lathe_chatter.errors import NothingSavedError
 from lathe_chatter.recording import recover
 
 EXAMPLE = 'lathe-chatter recover runs/damaged --output runs/saved'
@@ -25,14 +27,19 @@ def run(options: Namespace) -> int:
     """Recover; 0 if nothing had to be left behind, else 1."""
     path: Path = options.run_path
     output = options.output or path.with_name(f'{path.stem}-recovered')
-    with writing(utf8('--output', output)):
-        saved = recover(path, output)
-    screen = Screen(json=options.json)
-    damage = [*map(str, saved.damage), *saved.lost]
-    for name, count in sorted(saved.messages.items()):
+    screen, messages = Screen(json=options.json), Counter[str]()
+    try:
+        with writing(utf8('--output', output)):
+            saved = recover(path, output)
+    except NothingSavedError as error:
+        made, damage, end = None, error.damage, str(error)
+    else:
+        made, damage, end = output, [*map(str, saved.damage), *saved.lost], f'saved into {output}'
+        messages = saved.messages
+    for name, count in sorted(messages.items()):
         screen.say(f'{count:9d}  {name}')
     for each in damage:
         screen.say(f'LOST  {each}')
-    screen.say(f'saved into {output}')
-    screen.json({'run': output, 'messages': saved.messages, 'damage': damage})
+    screen.say(end)
+    screen.json({'run': made, 'messages': messages, 'damage': damage})
     return 1 if damage else 0

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from lathe_chatter.atomic_output import atomic_output
 from lathe_chatter.code_identity import code_identity
 from lathe_chatter.dataset.plan import Form, Plan
 from lathe_chatter.dataset.windows import DrawnRun, Table, drawn_machine, unit_of, windows_of
@@ -103,8 +104,6 @@ def make_dataset(
         if folder.is_dir() and not manifest.exists() and any(folder.iterdir()):
             raise DatasetError(f'{folder} holds other files: give another folder.')
         with closing(ResultFile(manifest, header, _known_part)) as file:
-            for left in [*folder.rglob('.*.partial')]:  # by a process that was killed
-                shutil.rmtree(left)
             there = {entry['part']: entry for entry in file.entries if _is_there(folder, entry)}
             missing = [[part] for part in parts_of(plan).items() if part[0] not in there]
             progress(sum(entry['windows'] for entry in there.values()), plan.windows)
@@ -144,16 +143,12 @@ def _is_there(folder: Path, entry: dict[str, Any]) -> bool:
 
 
 def _write(path: Path, files: Files) -> None:
-    """Write files elsewhere, and rename them when they are whole."""
-    path.parent.mkdir(exist_ok=True)
-    with TemporaryDirectory(dir=path.parent, prefix='.', suffix='.partial') as name:
-        part = Path(name) / 'part'
+    with atomic_output(path) as part:
         for file, content in files.items():
             (part / file).parent.mkdir(parents=True, exist_ok=True)
             (part / file).write_bytes(content)
         if path.is_dir():  # one that no line of the manifest speaks of
             shutil.rmtree(path)
-        part.replace(path)
 
 
 def read_windows(folder: Path | str, split: str | None = None) -> Table:

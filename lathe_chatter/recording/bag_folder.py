@@ -51,7 +51,8 @@ def run_folder(folder: Path) -> RunFolder:
         RunReadError: If there is no run, or there are several and nothing says which is meant.
     """
     if not folder.is_dir():
-        raise RunReadError(f'{folder} does not exist.')
+        wrong = 'is neither a file nor a folder' if folder.exists() else 'does not exist'
+        raise RunReadError(f'{folder} {wrong}.')
     metadata, listed = _described(folder)
     mode = str((metadata or {}).get('compression_mode') or 'none').lower()
     if mode != 'none':

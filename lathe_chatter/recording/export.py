@@ -8,13 +8,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.atomic_output import atomic_output
 from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError, optional
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_blocks import TIME
@@ -56,7 +57,7 @@ def to_csv(
         OSError: If the file cannot be written.
     """
     parts = ExportedParts(run, chosen or Selection(), progress)
-    with _whole(path), path.open('w', encoding='ascii', newline='') as stream:
+    with _new(path) as file, file.open('w', encoding='ascii', newline='') as stream:
         stream.write(','.join(f'{name} [{UNITS.get(name, "")}]' for name in parts.names) + '\n')
         for part in parts:
             stream.writelines(','.join(map(repr, row)) + '\n' for row in part.tolist())
@@ -84,7 +85,7 @@ def to_parquet(
         ]
     )
     form = {'compression': 'zstd', 'use_dictionary': False, 'use_byte_stream_split': True}
-    with _whole(path), parquet.ParquetWriter(path, schema, **form) as writer:
+    with _new(path) as file, parquet.ParquetWriter(file, schema, **form) as writer:
         for part in parts:
             arrays = [np.ascontiguousarray(column) for column in part.T]
             writer.write_table(arrow.table(arrays, schema=schema))
@@ -110,7 +111,7 @@ def to_mat(
     from scipy.io import savemat  # half a second to load, and only wanted here
 
     parts = ExportedParts(run, chosen or Selection(), progress)
-    with _whole(path):
+    with _new(path) as file:
         kept = []
         for part in parts:
             kept.append(part)
@@ -130,7 +131,7 @@ def to_mat(
             'run': str(run.path),
         }
         savemat(
-            str(path),
+            str(file),
             {**signals, **facts},
             appendmat=False,
             oned_as='column',
@@ -154,7 +155,7 @@ def to_hdf5(
     """
     h5py = optional('h5py', 'HDF5')
     parts = ExportedParts(run, chosen or Selection(), progress)
-    with _whole(path), h5py.File(path, 'w') as file:
+    with _new(path) as whole, h5py.File(whole, 'w') as file:
         kind = {'dtype': 'f8', 'maxshape': (None,), 'chunks': (1 << 16,)}
         signals = [file.create_dataset(name, (0,), **kind) for name in parts.names]
         for name, signal in zip(parts.names, signals, strict=True):
@@ -228,16 +229,11 @@ class ExportedParts:
             )
 
 
-@contextmanager
-def _whole(path: Path) -> Iterator[None]:
-    """A new file that is there whole or not at all."""
+def _new(path: Path) -> AbstractContextManager[Path]:
+    """Where to write a file that is not there yet."""
     if path.exists():
         raise ExportExistsError(path)
-    try:
-        yield
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
+    return atomic_output(path)
 
 
 def discontinuity_sentences(exported: Exported) -> Iterable[str]:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from lathe_chatter.array_types import Integers
-from lathe_chatter.recording.atomic_folder import atomic_folder
+from lathe_chatter.atomic_output import atomic_output
+from lathe_chatter.errors import RunExistsError
 from lathe_chatter.recording.export import Exported, ExportedParts, Progress
 from lathe_chatter.recording.metadata_yaml import Topic
 from lathe_chatter.recording.recorded_file import Raw, offered_qos
@@ -45,7 +46,9 @@ def unroll(
     parts = ExportedParts(run, chosen, progress)
     others = _others(run, topic, chosen)
     written, base, last = 0, 0, 0
-    with atomic_folder(path), RunWriter(path) as writer:
+    if path.exists():
+        raise RunExistsError(path)
+    with atomic_output(path) as folder, RunWriter(folder) as writer:
         topics = {k: f'{topic}/{n}' for k, n in enumerate(parts.names) if n != TIME}
         for name in topics.values():
             writer.add_topic(topic_of_type(name, NUMBER_TYPE))

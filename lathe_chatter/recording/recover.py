@@ -9,7 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lathe_chatter.recording.atomic_folder import atomic_folder
+from lathe_chatter.atomic_output import atomic_output
+from lathe_chatter.errors import NothingSavedError, RunExistsError
 from lathe_chatter.recording.file_completeness import lost_at_the_end
 from lathe_chatter.recording.mcap_chunk_walk import Damage
 from lathe_chatter.recording.metadata_yaml import Topic
@@ -50,18 +51,23 @@ def recover(path: Path | str, output: Path | str) -> Recovery:
 
     Raises:
         RunReadError: If there is no such run.
+        NothingSavedError: If nothing of it is sound; no folder is made.
         RunExistsError: If the folder to make exists.
         OSError: If it cannot be written.
     """
     old, output = read_run(path, damaged=True), Path(output)
     distribution = str(((old.folder and old.folder.metadata) or {}).get('ros_distro', 'unknown'))
-    with atomic_folder(output):
-        copy = _Copy(output, distribution)
+    if output.exists():
+        raise RunExistsError(output)
+    with atomic_output(output) as folder:
+        copy = _Copy(folder, distribution)
         for place, file in enumerate(old.opened):
             if place:
                 copy.files.split()
             copy.add(file)
         lost = lost_at_the_end(old, copy.messages, copy.last)
+        if old.damage and not copy.has_anything:
+            raise NothingSavedError(old.path, [*map(str, old.damage), *lost])
         noted = json.dumps([*map(str, old.damage), *lost])
         copy.files.note(RECOVERED, {'from': str(old.path), 'damage': noted})
         copy.files.close()
@@ -95,6 +101,12 @@ class _Copy:
         self._numbers: dict[bytes, int] = {}
         self._described: dict[int, bytes] = {}
         self._noted: list[Note] = []
+        self._attached = False
+
+    @property
+    def has_anything(self) -> bool:
+        """Whether anything was copied."""
+        return bool(self._numbers or self._noted or self._attached)
 
     def add(self, file: RecordedFile) -> None:
         """Copy what a file holds."""
@@ -103,6 +115,7 @@ class _Copy:
                 self._noted.append(note)
                 self.files.note(note.name, note.values)
         for attachment in file.attachments():
+            self._attached = True
             self.files.attach(attachment.name, attachment.media_type, attachment.data)
         size = 0
         for contents in file.contents():

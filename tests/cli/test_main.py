@@ -348,6 +348,9 @@ def test_an_interrupted_verb_says_so(
     [
         (['--format', 'mat', '--output', 'x.csv'], 'a name that ends in .mat'),
         (['--output', 'x.png'], 'a name that ends in .csv'),
+        (['--output', 'x.xyz'], 'a name that ends in .csv'),
+        (['--columns', ''], 'names with commas between them'),
+        (['--columns', 'time,'], 'names with commas between them'),
         (['--unrolled', '--output', 'x.csv'], 'the name of a folder'),
     ],
 )

@@ -83,3 +83,22 @@ def test_without_samples_there_is_nothing_to_compute_again(
 ) -> None:
     assert main(['verify', str(folder), '--resimulate']) == 2
     assert 'holds no samples of a lathe' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('content', [b'', bytes(range(256)) * 20])
+def test_what_nothing_can_be_saved_of_is_said_and_leaves_no_folder(
+    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'a.mcap').write_bytes(content)
+    assert main(['recover', str(tmp_path / 'a.mcap')]) == 1
+    said = capsys.readouterr().out
+    assert 'LOST' in said
+    assert said.endswith('a.mcap could be saved\n')
+    assert main(['recover', str(tmp_path / 'a.mcap'), '--json']) == 1
+    assert json.loads(capsys.readouterr().out)['run'] is None
+    assert [*tmp_path.iterdir()] == [tmp_path / 'a.mcap']
+
+
+def test_a_device_is_said_to_be_no_file(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['verify', '/dev/null']) == 2
+    assert '/dev/null is neither a file nor a folder.' in capsys.readouterr().err

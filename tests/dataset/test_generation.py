@@ -97,9 +97,10 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     (folder / json.loads(lines[1])['part']).unlink()
     short = folder / json.loads(lines[2])['part']
     short.write_bytes(short.read_bytes()[:100])
-    for place in (folder, folder / 'train'):
-        (place / '.abc.partial').mkdir()
-        (place / '.abc.partial' / 'part').write_bytes(b'x')
+    for place in (manifest, folder / json.loads(lines[1])['part']):
+        beside = place.with_name(f'.{place.name}.partial')
+        beside.mkdir()
+        (beside / 'part').write_bytes(b'x')
     make_dataset(plan, folder)
     assert digests(folder) == digests(tmp_path / 'whole')
     kept = [path for path, time in there.items() if path.stat().st_mtime_ns == time]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.recorded import number, topic
 
-from lathe_chatter.errors import RunReadError
+from lathe_chatter.errors import NothingSavedError, RunReadError
 from lathe_chatter.recording import RunWriter, read_run, recover, verify
 
 START = 1_700_000_000_000_000_000
@@ -133,7 +133,9 @@ def test_a_file_that_is_none_is_refused_and_verified(data: bytes, tmp_path: Path
     assert not verify(file).complete
     with pytest.raises(RunReadError, match=f'is damaged at byte {len(data)}: it has no sound'):
         list(read_run(file).topics)
-    assert recover(file, tmp_path / 'saved').messages == {}
+    with pytest.raises(NothingSavedError):
+        recover(file, tmp_path / 'saved')
+    assert [*tmp_path.iterdir()] == [file]
 
 
 def test_folders_without_a_run_are_refused(tmp_path: Path) -> None:

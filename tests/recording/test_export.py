@@ -143,7 +143,7 @@ def test_an_export_that_fails_leaves_nothing_in_the_way_of_the_next(
         (('--start', 'nan'), 'start is nan s'),
         (('--start', '1e6'), 'holds no samples from 1000000'),
         (('--topic', '/x/samples'), 'no samples of the topic /x/samples'),
-        (('--columns', ''), 'no column'),
+        (('--columns', ''), 'names with commas between them'),
     ],
 )
 def test_a_choice_of_nothing_is_one_sentence_and_leaves_no_file(
