@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from lathe_chatter.errors import optional
 from lathe_chatter.recording.sample_blocks import TIME
 from lathe_chatter.recording.sample_series import Samples
@@ -21,12 +23,20 @@ def to_pandas(samples: Samples) -> Any:
     """
     pandas = optional('pandas', 'A DataFrame')
     frame = pandas.DataFrame(samples.columns).set_index(TIME)
-    frame.attrs = _facts(samples)
+    frame.attrs = {
+        'units': {name: UNITS.get(name, '') for name in samples.columns},
+        'gaps': samples.gaps,
+        'restarts': samples.restarts,
+    }
     return frame
 
 
 def to_xarray(samples: Samples) -> Any:
-    """Samples, with their time, as a Dataset over simulated time, s; otherwise as `to_pandas`.
+    """Samples, with their time, as a Dataset over simulated time, s, which netCDF can hold.
+
+    Returns:
+        A Dataset; each variable has its `units`, and `attrs` the gaps and restarts, which it
+        joins, as (2n,): before and after of one, of the next, ...
 
     Raises:
         MissingPackageError: If xarray is not installed.
@@ -37,13 +47,6 @@ def to_xarray(samples: Samples) -> Any:
         for name, values in samples.columns.items()
         if name != TIME
     }
+    joined = {'gaps': np.ravel(samples.gaps), 'restarts': np.ravel(samples.restarts)}
     time = (TIME, samples.columns[TIME], {'units': UNITS[TIME]})
-    return xarray.Dataset(signals, coords={TIME: time}, attrs=_facts(samples))
-
-
-def _facts(samples: Samples) -> dict[str, Any]:
-    return {
-        'units': {name: UNITS.get(name, '') for name in samples.columns},
-        'gaps': samples.gaps,
-        'restarts': samples.restarts,
-    }
+    return xarray.Dataset(signals, coords={TIME: time}, attrs=joined)

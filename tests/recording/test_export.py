@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
-from scipy.io import loadmat
+from scipy.io import loadmat, netcdf_file
 from support.recorded import BOOL, NUMBER, STORE
 
 from lathe_chatter.array_types import Array
@@ -219,7 +219,25 @@ def test_pandas_and_xarray_have_the_same_numbers(folder: Path, samples: Array) -
     data = run.to_xarray()
     assert data['tool_velocity'].attrs == {'units': 'm/s'}
     assert data['tool_velocity'].sel(time=0.05).item() == samples[499, 3]
-    assert data.attrs['gaps'] == [(0.06, 0.0621)]
+    assert data.attrs['gaps'].tolist() == [0.06, 0.0621]
+
+
+def test_a_data_set_of_xarray_is_a_netcdf_file_with_its_units(
+    folder: Path, samples: Array, tmp_path: Path
+) -> None:
+    xarray = pytest.importorskip('xarray')
+    run = read_run(folder)
+    for end in (0.05, 1.0):  # without and with a gap
+        data = run.to_xarray(end=end)
+        data.to_netcdf(tmp_path / 'x.nc', engine='scipy')
+        with netcdf_file(tmp_path / 'x.nc', mmap=False) as found:
+            assert found.variables['tool_velocity'].units == b'm/s'
+            assert found.variables['time'].units == b's'
+            assert np.ravel(found.gaps).tolist() == ([] if end < 0.06 else [0.06, 0.0621])
+            inside = samples[samples[:, 0] <= end]
+            assert found.variables['tool_velocity'][:].tolist() == inside[:, 3].tolist()
+        with xarray.open_dataset(tmp_path / 'x.nc') as again:
+            assert again.equals(data)
 
 
 @pytest.mark.parametrize('name', ['pandas', 'xarray'])
