@@ -19,6 +19,7 @@ from lathe_chatter.lathe.integrator.coefficients import Constants, constants_of
 from lathe_chatter.lathe.integrator.eigenvectors import product
 from lathe_chatter.lathe.integrator.step_size import steps_per_sample
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode, paper_initial_state
+from lathe_chatter.model.machine import RIGID
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.model.quantity_fields import Quantity
 
@@ -58,15 +59,15 @@ class LatheState:
             setup: Machine, force law and sampling.
             cut: What is cut at the start.
             initial_state: Tool displacement and velocity, workpiece displacement and velocity
-                (4,), m and m/s; by default the paper's. A body with several modes is displaced as
-                by a force that rests on it, and has its velocity from a blow, both in the chip
-                direction.
+                (4,), m and m/s; by default the paper's, of a rigid body none. A body with several
+                modes is displaced as by a force that rests on it, and has its velocity from a
+                blow, both in the chip direction.
 
         Raises:
             ParameterError: If the initial state is not four finite numbers, or the machine with
                 this cut is too fast for the sample rate.
         """
-        given = paper_initial_state(cut) if initial_state is None else initial_state
+        given = _usual_start(setup.machine, cut) if initial_state is None else initial_state
         if np.shape(given) != (4,):
             raise ParameterError('initial_state', given, '', 'four numbers')
         start = np.array([_STATE.check('initial_state', value) for value in given])
@@ -322,6 +323,12 @@ def _setup_from(words: dict[str, Any]) -> LatheSetup:
         several = 'modes' in body
         machine[name] = [Mode(**mode) for mode in body['modes']] if several else Mode(**body)
     return LatheSetup(Machine(**machine), **words)
+
+
+def _usual_start(machine: Machine, cut: Cut) -> Array:
+    """The paper's initial state (4,), in which a body that does not give stands still."""
+    moves = [body != RIGID for body in (machine.tool, machine.workpiece)]
+    return paper_initial_state(cut) * np.repeat(moves, 2)
 
 
 def _modal(start: Array, constants: Constants) -> Array:

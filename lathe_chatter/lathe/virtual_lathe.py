@@ -58,7 +58,8 @@ class VirtualLathe:
         machine: Tool, workpiece, bearing and material; by default the paper's.
         cut: What is cut at the start; see `retune`.
         initial_state: Tool displacement and velocity, workpiece displacement and velocity at
-            t = 0 (4,), m and m/s; by default the paper's. The surface before t = 0 is smooth.
+            t = 0 (4,), m and m/s; by default the paper's, of a rigid body none. The surface
+            before t = 0 is smooth.
         sample_rate: Samples per simulated second, Hz.
         tool_leaves_cut: The force law, as above.
         spindle_acceleration: rev/min per s at which the speed follows a change; 0 for a step.

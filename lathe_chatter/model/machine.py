@@ -240,6 +240,8 @@ class Machine:
 
 
 PARTICIPATION = Quantity('participation of a mode', low=-1e6, high=1e6)
+RIGID = Mode(5e4, 2.0 * math.pi * 1e3, 0.5)
+"""What a machine file calls `rigid`: 2e12 N/m, well damped: no figure shows that it gives."""
 
 
 def _body(name: str, given: object) -> Body:

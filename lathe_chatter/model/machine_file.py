@@ -19,7 +19,7 @@ import yaml
 
 from lathe_chatter.errors import MachineFileError, ParameterError, reason_of
 from lathe_chatter.model.cut import BearingContact, Cut
-from lathe_chatter.model.machine import PARTICIPATION, Body, Machine, Mode
+from lathe_chatter.model.machine import PARTICIPATION, RIGID, Body, Machine, Mode
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.model.parameter_table import Row, rows_of
 from lathe_chatter.model.quantity_fields import Quantity, limits_of
@@ -55,8 +55,6 @@ _IN_FILE = {
     },
 }
 """Where each value of the file but those of the modes stands in a `MachineDescription`."""
-RIGID = Mode(5e4, _TURN * 1e3, 0.5)
-"""What a file calls `rigid`: 2e12 N/m, well damped, so that no figure shows that it gives."""
 _ASSUMED = {
     'tool': 'a tool (50 g at 123 Hz; `tool: rigid` is one that does not give)',
     'workpiece': 'a workpiece (50 g at 103 Hz; `workpiece: rigid` is one that does not give)',

@@ -13,7 +13,7 @@ from lathe_chatter.detection.estimate import Mode as WorksWith
 from lathe_chatter.detection.giving_bodies import identifiable
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.model.machine_file import RIGID
+from lathe_chatter.model.machine import RIGID
 from lathe_chatter.stability import critical_depth, rightmost_root
 
 _TURN = 2.0 * math.pi

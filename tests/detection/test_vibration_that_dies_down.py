@@ -9,7 +9,7 @@ import pytest
 from lathe_chatter.detection import ChatterDetector, Estimate
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine, Mode
-from lathe_chatter.model.machine_file import RIGID
+from lathe_chatter.model.machine import RIGID
 from lathe_chatter.stability import critical_depth, rightmost_root
 
 _TURN = 2.0 * math.pi

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from lathe_chatter.errors import ParameterError, StateError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
+from lathe_chatter.model.machine import RIGID
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 
 _MACHINE = Machine(Mode(0.04, 800.0, 0.03), Mode(0.06, 600.0, 0.04), cutting_coefficient=3e6)
@@ -85,3 +87,19 @@ def test_a_state_of_another_format_is_refused(tmp_path: Path) -> None:
 def test_a_setup_that_makes_no_sense_is_refused(options: dict[str, object], sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence):
         LatheSetup(**options)  # type: ignore[arg-type]  # the point of the test
+
+
+@pytest.mark.parametrize('column', [2, 4], ids=['tool', 'workpiece'])
+def test_a_rigid_body_stands_still_where_the_other_starts_as_the_paper_has_it(column: int) -> None:
+    """Its 2e12 N/m leave it what the force pushes it by: it had started with the paper's speed."""
+    body, cut = (
+        Mode(2.0, 2.0 * math.pi * 450.0, 0.03),
+        Cut(depth_of_cut=1e-4, bearing_contact='none'),
+    )
+    bodies = (RIGID, body) if column == 2 else (body, RIGID)
+    lathe = VirtualLathe(Machine(*bodies, cutting_coefficient=9e8), cut)
+    samples = np.vstack([lathe.snapshot().motion(), lathe.advance(2000)[:, 2:6]])
+    still, moving = (samples[:, k : k + 2] for k in (column - 2, 4 - column))
+    force = 9e8 * 1e-4 * 5.0 * cut.feed
+    assert np.abs(still[:, 0]).max() < force / 2e12
+    assert moving[0] == pytest.approx([50e-9, 0.0025])
