@@ -16,8 +16,9 @@ for axis, impulse in zip(axes, (0.0006, 0.002)):
     lathe = lc.VirtualLathe(cut=cut)
     lathe.advance(20_000)  # 2 s, in which the start dies out
     lathe.knock(impulse)  # N s on the tool
-    samples = lathe.advance(40_000)
-    axis.plot(samples[:, 0], samples[:, 2] * 1e6, linewidth=0.4)
+    turns = lathe.advance(40_000).reshape(200, 200, -1)  # of 0.02 s, 200 samples
+    time, tool = turns[:, 0, 0], turns[:, :, 2] * 1e6
+    axis.fill_between(time, tool.min(axis=1), tool.max(axis=1))  # from end to end of each turn
     axis.set_title(f'a knock of {impulse * 1e3:g} mN s', loc='left')
     axis.set_ylabel('tool / um')
 axes[-1].set_xlabel('time / s')

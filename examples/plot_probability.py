@@ -22,7 +22,7 @@ figure, axes = plt.subplots(figsize=(8, 4.5), layout='constrained')
 for share in (0.5, 0.95):
     depth = found.safe_depth(share) * 1e3
     axes.plot(speeds, depth, label=f'stable with {share:.0%}')
-axes.set_ylim(0.0, 3 * np.nanmin(found.safe_depth(0.5)) * 1e3)
+axes.set_ylim(bottom=0.0)
 axes.set_xlabel('spindle speed / (rev/min)')
 axes.set_ylabel('depth of cut / mm')
 axes.legend()
