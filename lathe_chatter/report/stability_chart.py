@@ -297,7 +297,7 @@ def draw_limits(
             color=SAFE,
             alpha=0.16,
             lw=0,
-            label='small disturbances die out',
+            label='every smaller depth is stable',
         )  # fmt: skip
     if contact is not BearingContact.SEATED:
         axes.plot(speeds, shown(limits.open_limit), color=OPEN, lw=1.3, label='limit, open')

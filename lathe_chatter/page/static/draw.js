@@ -217,7 +217,7 @@ function drawSpectrum(amplitudes, step, speed, chatter) {
 }
 
 const LIMITS = [
-  ['depth_of_cut', 'small disturbances die out', 'safe', [], 'none seated gap both_sides'],
+  ['depth_of_cut', 'every smaller depth is stable', 'safe', [], 'none seated gap both_sides'],
   ['open_limit', 'limit, open', 'tool', [], 'none gap both_sides'],
   ['seated_limit', 'limit, on its bearing', 'workpiece', [8, 4], 'seated gap both_sides'],
   ['seating_line', 'seating line', 'ink', [2, 3], 'gap both_sides'],

@@ -324,7 +324,7 @@ function showChart() {
     const [low, high] = [chart[name][Math.max(k - 1, 0)], chart[name][k]];
     return low == null || high == null ? 'none' : `${number((low + share * (high - low)) * MILLI)} mm`;
   };
-  const text = k < 0 ? '' : `The cut: ${point.speed.toFixed(0)} rev/min, ${(point.depth * MILLI).toFixed(3)} mm. Small disturbances die out there up to ${limit('depth_of_cut')}; limit open ${limit('open_limit')}${chart.contact === 'none' ? '' : `, on its bearing ${limit('seated_limit')}`}.${cell.charting ? ' The chart is being computed anew ...' : ''}`;
+  const text = k < 0 ? '' : `The cut: ${point.speed.toFixed(0)} rev/min, ${(point.depth * MILLI).toFixed(3)} mm. Limits there: ${limit('depth_of_cut')}, below which every depth is stable to small disturbances; open ${limit('open_limit')}${chart.contact === 'none' ? '' : `, on its bearing ${limit('seated_limit')}`}.${cell.charting ? ' The chart is being computed anew ...' : ''}`;
   if ($('chart-text').textContent !== text) {
     $('chart-text').textContent = text;
     describe('chart', `Stability chart. ${text}`);
