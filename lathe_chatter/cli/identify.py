@@ -125,8 +125,8 @@ def run(options: Namespace) -> int:
 
 
 _UNKNOWN = {
-    'tool': 'the tool (`tool: rigid`, if it does not give)',
-    'workpiece': 'the workpiece (`workpiece: rigid`, if it does not give)',
+    'tool': 'the tool (if it is rigid, add the line `tool: rigid`)',
+    'workpiece': 'the workpiece (if it is rigid, add the line `workpiece: rigid`)',
     'bearing': 'the bearing and its clearance',
     'material': 'the cutting coefficient (steel has about 2000 MPa)',
     'spindle': "the spindle's speeds",
@@ -144,14 +144,17 @@ def _unknown(fits: dict[str, ModalFit], base: MachineDescription, *, given: bool
 
 def _said_of(unknown: Sequence[str]) -> str:
     """What the file lacks, and what a machine without that is: see `load_machine`."""
-    taken = []
+    others = []
     if 'bearing' in unknown and 'workpiece' not in unknown:
-        taken.append('no bearing clearance')
+        others.append('there is no bearing clearance')
     if 'spindle' in unknown:
-        taken.append('any speed')
-    taken.append('else what the paper has' if taken else 'what the paper has')
+        others.append('the spindle may turn at any speed')
     names = ', '.join(_UNKNOWN[name] for name in unknown)
-    return f'Not measured, and so not in the file: {names}. Without: {", ".join(taken)}.'
+    but = f', except that {" and ".join(others)}' if others else ''
+    return (
+        f'Not measured, and so not in the file: {names}. Until they are added, the values of the '
+        f"paper's machine stand in for them{but}."
+    )
 
 
 _FIGURES = ('frequency', 'damping_ratio', 'stiffness')

@@ -113,8 +113,8 @@ def run(options: Namespace) -> int:
         return INTERRUPTED
     with writing(options.output):
         draw_knock_map(knocks, options.output)
-    _show(knocks, screen)
     say_what_is_assumed(config.described, screen, config.machine, config.cut)
+    _show(knocks, screen)
     screen.name_file('points', options.output)
     for file in files:
         screen.name_file('picture', file)

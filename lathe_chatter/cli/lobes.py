@@ -149,10 +149,10 @@ def run(options: Namespace) -> int:
             _write_csv(options.csv, _columns(config, limits), growth, probability)
     if growth is not None or probability is not None:
         kept.unlink(missing_ok=True)
-    _show(config, limits, screen)
     say_what_is_assumed(config.described, screen, config.machine, config.cut)
     for sentence in _doubts(config, limits):
         screen.say(f'WARNING  {sentence}')
+    _show(config, limits, screen)
     figures = _figures(config, limits, growth)
     if probability is not None and known:
         of_cut = stability_probability(
@@ -356,8 +356,9 @@ def _write_table(path: Path, columns: dict[str, Array]) -> None:
 
 def _figures(config: LatheConfig, limits: SafeLimit, growth: GrowthMap | None) -> dict[str, Any]:
     """The chart as figures; an infinite limit is null in JSON."""
+    machine = config.description.sections() if config.described else None
     return {
-        'parameters': config.parameters(),
+        'parameters': config.parameters() | {'machine': machine},
         **_columns(config, limits),
         **({} if growth is None else {'map': growth}),
     }

@@ -56,8 +56,8 @@ _IN_FILE = {
 }
 """Where each value of the file but those of the modes stands in a `MachineDescription`."""
 _ASSUMED = {
-    'tool': 'a tool (50 g at 123 Hz; `tool: rigid` is one that does not give)',
-    'workpiece': 'a workpiece (50 g at 103 Hz; `workpiece: rigid` is one that does not give)',
+    'tool': 'a tool (50 g at 123 Hz; if it is rigid, add the line `tool: rigid`)',
+    'workpiece': 'a workpiece (50 g at 103 Hz; if it is rigid, add the line `workpiece: rigid`)',
     'cutting_coefficient': 'a cutting coefficient (3.5 MPa; steel has about 2000 MPa)',
 }
 """What is taken where a file has one body, and lacks another or the material."""

@@ -15,6 +15,7 @@ from lathe_chatter.cli import lobes
 from lathe_chatter.cli import main as cli
 from lathe_chatter.errors import UnprovenError
 from lathe_chatter.model import BearingContact, Cut, Machine
+from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.stability import rightmost_root, safe_limit
 
 
@@ -302,6 +303,31 @@ def test_a_chart_of_a_machine_marks_no_cut_that_nobody_has_named(
         assert ('is stable with' in capsys.readouterr().out) is known
 
 
+def test_the_legend_says_no_more_of_the_white_than_is_known(tmp_path: Path) -> None:
+    """Here a cut on the bearing is stable beyond the open limit, and the area ends below it."""
+    file, cut = tmp_path / 'a.svg', Cut(7200.0, 2e-3)
+    assert cli.main(['lobes', '--output', str(file), '--from', '6500', '--to', '8000']) == 0
+    found = safe_limit(Machine(), cut, 7200.0)
+    assert found.depth_of_cut < found.seating_line < cut.depth_of_cut < found.seated_limit
+    assert rightmost_root(Machine(), 7200.0, cut.depth_of_cut, seated=True).real < 0.0
+    legend = file.read_text(encoding='utf-8')
+    assert 'every smaller depth is stable' in legend
+    assert 'small disturbances die out' not in legend
+
+
+def test_the_machine_of_a_chart_is_an_object_in_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ['lobes', '--output', str(tmp_path / 'a.png'), '--json', '--force']
+    assert cli.main([*call, '--machine', 'chucked_shaft']) == 0
+    machine = json.loads(capsys.readouterr().out)['parameters']['machine']
+    described = load_machine('chucked_shaft')
+    assert load_machine(json.dumps(machine)).machine == described.machine
+    assert machine['material']['cutting_coefficient'] == described.machine.cutting_coefficient
+    assert cli.main(call) == 0
+    assert json.loads(capsys.readouterr().out)['parameters']['machine'] is None
+
+
 def test_a_chart_of_a_varied_speed_keeps_all_of_its_swing_in_the_range_of_the_spindle(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -346,7 +372,11 @@ def test_a_chart_says_where_the_machine_of_the_paper_stands_in(
     file.write_text('tool: {modes: [{frequency: 200 Hz, damping_ratio: 2 %, mass: 5 kg}]}\n')
     call = ['lobes', '--machine', str(file), '--force', '--output', str(tmp_path / 'a.png')]
     assert cli.main(call) == 0
-    assert 'WARNING  The machine file tool lacks a workpiece (50 g' in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert said.startswith('WARNING  The machine file tool lacks a workpiece (50 g'), (
+        'before limits'
+    )
+    assert 'if it is rigid, add the line `workpiece: rigid`' in ' '.join(said.split())
     assert cli.main([*call, '--cutting-coefficient', '2e9', '--workpiece.mass', '60']) == 0
     assert 'WARNING' not in capsys.readouterr().out
 

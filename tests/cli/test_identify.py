@@ -61,14 +61,17 @@ def test_what_was_not_measured_is_said_and_left_out(
     assert cli.main(call) == 0
     said = capsys.readouterr().out
     for name in (
-        'the workpiece (`workpiece: rigid`',
+        'the workpiece (if it is rigid, add the line `workpiece: rigid`',
         'cutting coefficient',
         'speeds',
         'clearance',
     ):
         assert name in said.partition('WARNING  Not measured')[2]
         assert name in output.read_text().splitlines()[0]
-    assert said.splitlines()[-3].endswith('Without: any speed, else what the paper has.')
+    assert said.splitlines()[-3].endswith(
+        "Until they are added, the values of the paper's machine stand in for them, except that "
+        'the spindle may turn at any speed.'
+    )
     assert set(yaml.safe_load(output.read_text())) == {'tool'}
     assert load_machine(output).assumed == ('workpiece', 'cutting_coefficient')
     assert cli.main([*call, '--machine', 'chucked_shaft', '--force']) == 0
@@ -77,7 +80,7 @@ def test_what_was_not_measured_is_said_and_left_out(
     both = ['identify', *(f'{body}={file}' for body, file in tap_tests.items())]
     assert cli.main([*both, '--output', str(output), '--force']) == 0
     said = capsys.readouterr().out
-    assert 'Without: no bearing clearance, any speed, else what the paper has.' in said
+    assert 'except that there is no bearing clearance and the spindle may turn at any' in said
     assert load_machine(output).cut.bearing_contact is BearingContact.NONE
 
 
