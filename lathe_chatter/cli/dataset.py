@@ -46,20 +46,25 @@ def run(options: Namespace) -> int:
     screen.compile()
     if options.workers is None and options.cluster is None:
         options.workers = cores()
-    with screen.working('Making the windows of a machine, to estimate ...'):
-        cost = _estimate(plan)
-    if options.dry_run:
+    cost, parts = None, [folder / name for name in parts_of(plan)]
+    if options.dry_run or not all(part.exists() for part in parts):
+        with screen.working('Making the windows of a machine, to estimate ...'):
+            cost = _estimate(plan)
+    if cost and options.dry_run:
         _say_cost(plan, cost, options.workers, screen)
         screen.json({'windows': plan.windows, 'bytes': cost.size, 'core_seconds': cost.seconds})
         return 0
     try:
         with executor_of(options, screen) as executor:
-            _say_cost(plan, cost, width_of(executor), screen)
-            _check_room(folder, cost)
+            if cost:
+                _say_cost(plan, cost, width_of(executor), screen)
+                _check_room(folder, cost)
             with screen.progress('windows', plan.windows) as bar:
                 entries = make_dataset(plan, folder, executor=executor, progress=bar.show)
     except KeyboardInterrupt:
-        screen.say(f'Interrupted: the same call goes on from what is in {folder}.')
+        there = sum(part.exists() for part in parts)
+        said = f'{there} of {len(parts)} parts are in {folder}'
+        screen.say(f'Interrupted: {said}, and the same call goes on from them.')
         return INTERRUPTED
     windows, stable = (sum(entry[name] for entry in entries) for name in ('windows', 'stable'))
     screen.say(f'{windows} windows, {stable / max(windows, 1):.1%} of a stable cut.')

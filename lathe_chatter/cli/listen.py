@@ -152,8 +152,8 @@ def _show(screen: Screen, judged: Judged, found: Score | None) -> None:
         screen.say(
             f'Without a spindle speed any line that holds the power is flagged: it stands at '
             f'{hertz} Hz. If that is a multiple of the turns a second it is the spindle, not '
-            'chatter: --spindle-speed-rpm tells them apart. A mode that the noise of cutting drives '
-            'is such a line too: an accelerometer on the tool, or both bodies and an angle, tell.'
+            'chatter: --spindle-speed-rpm tells them apart. A mode that the noise of cutting '
+            'drives is such a line too: a sensor of motion on the tool tells it from chatter.'
         )
     if found is not None:
         delay = 'none' if math.isnan(found.delay) else f'{found.delay:.2f} s (median)'

@@ -194,7 +194,12 @@ def _machine(section: Section, path: Path) -> dict[str, Any]:
     given, described = drawn.get(MACHINE_FILE.name), {'no file that': MachineDescription()}
     if given:
         places = {source: path.parent / source for source in given.values}
-        described = {s: load_machine(p if p.is_file() else s) for s, p in places.items()}
+        try:
+            described = {s: load_machine(p if p.is_file() else s) for s, p in places.items()}
+        except MachineFileError as error:
+            line = section.nodes[MACHINE_FILE.name].start_mark.line + 1
+            said = f'{section.file}, line {line}: machine.machine: {error}'
+            raise MachineFileError(said) from None
         texts = tuple(described[source].text() for source in given.values)
         drawn[MACHINE_FILE.name] = given._replace(values=texts)
     firsts, doubts = {name: how.values[0] for name, how in drawn.items()}, list[str]()
@@ -222,8 +227,11 @@ def _event(entry: Section, duration: float) -> Event:
     single = _values_of(entry, _EVENT, *_DRAWN, 'set')
     at, knock = map(_distributions(entry, _DRAWN, *single, 'set').get, _DRAWN)
     changes = _distributions(entry.inner('set'), CUT)
-    if at is None or min(at.values) >= duration or not (changes or knock):
-        raise entry.refused(f'an event needs at, within {duration:g} s, and set or knock')
+    if at is None or not (changes or knock):
+        raise entry.refused('an event needs at, and set or knock')
+    first = min(at.values) if at.kind == CHOICE else at.values[0]
+    if first >= duration:
+        raise entry.refused(f'at is {first:g} s, and the run ends at {duration:g} s')
     if single['over'] and (words := [n for n in changes if CUT[n].limits is None]):
         raise entry.refused(f'{words[0]} can only change at once, without over')
     return Event(at, changes, knock, **single)
@@ -286,10 +294,15 @@ def _distribution(
         raise inner.refused(f'{kind} must be a list of values', given)
     values = tuple(inner.value(kind, entry, row) for entry in given.value)
     if kind != CHOICE:
-        wrong = len(values) != 2 or row.limits is None or values[-1] <= 0.0
-        if wrong or (kind != NORMAL and not values[0] < values[1]):
+        wrong = len(values) != 2 or row.limits is None
+        if wrong or (kind == NORMAL and values[1] <= 0.0):
             meaning = 'mean and standard deviation' if kind == NORMAL else 'lowest and highest'
             raise inner.refused(f'{kind} must be two numbers, {meaning}', given)
+        if kind != NORMAL and not values[0] < values[1]:
+            low, high = map(text_of, given.value)
+            raise inner.refused(
+                f'{kind}: the lowest, {low}, must be below the highest, {high}', given
+            )
         if kind == LOG_UNIFORM and values[0] <= 0.0:
             raise inner.refused('log_uniform must begin above 0', given)
     return Distribution(kind, values, limits, of_limit)

@@ -280,7 +280,35 @@ def test_the_command_estimates_makes_and_tells(
     told = json.loads(capsys.readouterr().out)
     assert told['windows'] == 192
     assert told['stable'] == int(read_windows(folder)['stable'].sum())
+    assert cli.main(['dataset', plan, '--output', str(folder), '--workers', '1']) == 0
+    said = capsys.readouterr().out
+    assert '192 windows' in said
+    assert 'in 12 parts: about' not in said, 'nothing is missing'
     assert cli.main(['dataset', plan, '--output', str(folder), '--workers', '0']) == 2
     assert '--workers is 0' in capsys.readouterr().err
     assert cli.main(['dataset', str(tmp_path / 'no.yaml')]) == 2
     assert 'cannot be read: No such file' in capsys.readouterr().err
+
+
+def test_an_interrupted_command_says_how_many_parts_are_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan_of(tmp_path)
+    folder, written = tmp_path / 'data', list[Path]()
+    usual = generation._write
+
+    def stopping(path: Path, files: generation.Files) -> None:
+        if len(written) == 3:
+            raise KeyboardInterrupt
+        usual(path, files)
+        written.append(path)
+
+    call = ['dataset', str(tmp_path / 'plan.yaml'), '--output', str(folder), '--workers', '1']
+    with monkeypatch.context() as patch:
+        patch.setattr(generation, '_write', stopping)
+        assert cli.main(call) == 130
+    said = ' '.join(capsys.readouterr().out.split())
+    assert f'Interrupted: 3 of 12 parts are in {folder}, and the same call goes on' in said
+    assert all(path.exists() for path in written)
+    assert cli.main(call) == 0
+    assert len([*folder.glob('*/part-*')]) == 12
