@@ -328,7 +328,7 @@ def _setup_from(words: dict[str, Any]) -> LatheSetup:
 def _usual_start(machine: Machine, cut: Cut) -> Array:
     """The paper's initial state (4,), in which a body that does not give stands still."""
     moves = [body != RIGID for body in (machine.tool, machine.workpiece)]
-    return paper_initial_state(cut) * np.repeat(moves, 2)
+    return np.where(np.repeat(moves, 2), paper_initial_state(cut), 0.0)
 
 
 def _modal(start: Array, constants: Constants) -> Array:
