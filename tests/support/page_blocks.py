@@ -28,6 +28,8 @@ _NODE = re.compile(
     r'^(?:ros2 run lathe_chatter )?'
     r'(?=(?:lathe|chatter_monitor|run_recorder|cell|operator_page|chatter_supervisor)(?: |$))'
 )
+_FILE = 'file: '
+"""Begins the mark of a block that is a file of the reader, with its name."""
 _TIMEOUT = 280.0
 """s: less than that of the test, so that its failure says which command it was."""
 
@@ -59,7 +61,7 @@ def pages() -> list[Path]:
 
 
 def blocks(page: Path) -> list[Block]:
-    """The blocks of a page that could be run: shell, Python, and MATLAB, which cannot."""
+    """The blocks of a page that could be run: shell, Python, files, and MATLAB, which cannot."""
     text = page.read_text(encoding='utf-8')
     return [
         Block(
@@ -69,7 +71,7 @@ def blocks(page: Path) -> list[Block]:
             text[: found.start()].count('\n') + 1,
         )
         for found in _BLOCK.finditer(text)
-        if found['kind'] in {'sh', 'python', 'matlab'}
+        if found['kind'] in {'sh', 'python', 'matlab'} or (found['mark'] or '').startswith(_FILE)
     ]
 
 
@@ -96,6 +98,9 @@ class Reader:
         """Do one block; an error is the test's."""
         if block.mark == 'ends the nodes':
             self.end()
+        if block.mark.startswith(_FILE):
+            (self.folder / block.mark.removeprefix(_FILE)).write_text(block.text)
+            return
         if block.kind == 'python' and block.talks_to_ros:
             self._check([sys.executable, '-c', block.text], block.text)
             return
@@ -119,7 +124,7 @@ class Reader:
 
     def _type(self, command: str, *, fails: bool) -> None:
         if _NODE.match(command):
-            words = _NODE.sub('', command).split()
+            words = shlex.split(_NODE.sub('', command))
             node = subprocess.Popen(
                 words,
                 cwd=self.folder,
