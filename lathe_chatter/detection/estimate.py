@@ -20,6 +20,8 @@ IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = (
     'unknown',
 )
 STATES = (IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN)
+FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
+"""What of an estimate is published, where it is known, each under its name."""
 
 
 class Mode(str, Enum):

@@ -32,7 +32,6 @@ from lathe_chatter.nodes.lathe_diagnostics import TickStatistics
 from lathe_chatter.nodes.lathe_graph_watch import ClockWatch, PublisherWatch
 from lathe_chatter.nodes.lathe_log_and_record import LatheRecord
 from lathe_chatter.nodes.lathe_topics import LatheTopics
-from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.real_time_loop import (
@@ -96,7 +95,6 @@ class LatheNode(ParameterNode):
         )
         self._record = LatheRecord(self, values)
 
-        self._log = BoundedLog(QuickLog(self.get_logger()))
         self._control = RunControl()
         self._awaited: int = values['await_readers']
         if self._awaited:
@@ -105,8 +103,10 @@ class LatheNode(ParameterNode):
         tick = SECOND / values['tick_rate']
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
-        self._others = PublisherWatch(self, self._log)
-        self._clock_watch = ClockWatch(self, self._log, follows=self._follows, drives=drives)
+        self._others = PublisherWatch(self, self.bounded_log)
+        self._clock_watch = ClockWatch(
+            self, self.bounded_log, follows=self._follows, drives=drives
+        )
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
@@ -182,7 +182,7 @@ class LatheNode(ParameterNode):
         self._meter.lateness.add(self._pacer.lateness(now))
         self._make(due)
         if self._pacer.overruns != overruns:
-            self._log.warning(
+            self.bounded_log.warning(
                 f'Behind: {self._pacer.lag / SECOND:.3f} s of simulated time given up so far.',
                 'behind',
             )
@@ -208,7 +208,7 @@ class LatheNode(ParameterNode):
         late = self._pacer.lateness(now) / SECOND
         bound: float = self.values['clock_catch_up']  # type: ignore[assignment]  # a double
         if self._pacer.gone_back(now):
-            self._log.warning(
+            self.bounded_log.warning(
                 f'/clock went back by {-late:.3f} s to {now / SECOND:.3f} s: '
                 'the cut goes on from there.',
                 'clock back',
@@ -216,7 +216,7 @@ class LatheNode(ParameterNode):
             self._start_clock()
         elif late > bound:
             self._pacer.skip(now)
-            self._log.warning(
+            self.bounded_log.warning(
                 f'/clock is {late:.3f} s ahead of the cut at {now / SECOND:.3f} s, more than the '
                 f'{bound:g} s of clock_catch_up: that time is not cut.',
                 'clock ahead',
@@ -252,10 +252,9 @@ class LatheNode(ParameterNode):
         self._diagnostics.publish(self._statuses())
 
     def finish(self) -> None:
-        """Say what is still to be said, and finish its own record."""
-        if hasattr(self, '_log'):  # Kilted destroys nodes, too, that were refused half-made
+        """Finish its own record."""
+        if hasattr(self, '_record'):  # Kilted destroys nodes, too, that were refused half-made
             self._record.close()
-            self._log.end()
 
     # -- the cut ---------------------------------------------------------------------------
 
@@ -291,10 +290,10 @@ class LatheNode(ParameterNode):
         try:
             IMPULSE.check('impulse', message.data)
         except ParameterError as error:
-            self._log.warning(str(error), 'knock')
+            self.bounded_log.warning(str(error), 'knock')
         else:
             if len(self._knocks) == _MAX_KNOCKS:
-                self._log.warning(
+                self.bounded_log.warning(
                     f'More than {_MAX_KNOCKS} knocks between two ticks: the others are dropped.',
                     'too many knocks',
                 )
@@ -310,7 +309,7 @@ class LatheNode(ParameterNode):
         try:
             self._lathe.knock(impulse)
         except ParameterError as error:
-            self._log.warning(str(error), 'knock')
+            self.bounded_log.warning(str(error), 'knock')
         else:
             self._record.knocked(self._lathe.time, impulse)
 
@@ -366,9 +365,8 @@ class LatheNode(ParameterNode):
         if self._meter.flooded:
             share, served = self._meter.requests_share, self._meter.requests_served
             said = f'Requests take {share:.0%} of the time: {served} in the last second.'
-            self._log.warning(said, 'flood')
+            self.bounded_log.warning(said, 'flood')
         self._diagnostics.publish(self._statuses())
-        self._log.look()
         self._meter.begin_second()
         if self._control.state is not RunState.RUNNING:
             self._topics.publish_clock(self._stamp())  # for those that join a clock at rest

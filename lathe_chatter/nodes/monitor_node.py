@@ -15,14 +15,13 @@ from std_msgs.msg import Bool, Float64, String
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
-from lathe_chatter.detection.estimate import Mode
+from lathe_chatter.detection.estimate import FIGURES, Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.lathe_parameter_table import machine_in_cut
 from lathe_chatter.model.machine_file import MachineDescription, narrowed
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.lathe_cut_watch import LatheCutWatch
-from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.monitor_sentences import (
     SENTENCES,
     clearance,
@@ -48,7 +47,6 @@ _REST_ON_WATCH = 10_000_000
 """ns, likewise, while the vibration grows: an alarm may be due."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
-_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
 _UNKNOWN = 'unknown'
@@ -80,7 +78,6 @@ class MonitorNode(ParameterNode):
     def __init__(self, *, by_timer: bool = True, **options: Any) -> None:
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
-        self._log = BoundedLog(QuickLog(self.get_logger()))
         # Before the first sample comes.
         precompile(DETECTOR_LOOP, say=self.get_logger().info)
         source = ModelSource(self.values['model'])
@@ -105,7 +102,7 @@ class MonitorNode(ParameterNode):
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
         self._state_publisher = self._publisher(String, 'state', _LATCHED)
         self._figure_publishers = {
-            name: self._publisher(Float64, name, QoSProfile(depth=1000)) for name in _FIGURES
+            name: self._publisher(Float64, name, QoSProfile(depth=1000)) for name in FIGURES
         }
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))
@@ -160,7 +157,7 @@ class MonitorNode(ParameterNode):
 
     def _complain(self, error: LatheChatterError) -> None:
         self._complaint = str(error)
-        self._log.error(self._complaint, 'complaint')
+        self.bounded_log.error(self._complaint, 'complaint')
 
     def _follow(self, times: Array) -> bool:
         """Notice lost samples and another lathe; whether the samples can be judged."""
@@ -268,15 +265,11 @@ class MonitorNode(ParameterNode):
             nominal_rpm=numbers['spindle_speed_rpm'],
         )
 
-    def finish(self) -> None:
-        """Say what is still to be said."""
-        self._log.end()
-
     # -- what is said ----------------------------------------------------------------------
 
     def _say(self, kind: str, text: str) -> None:
         """Log a sentence of `monitor_sentences.SENTENCES`."""
-        getattr(self._log, SENTENCES[kind].severity)(text, kind)
+        getattr(self.bounded_log, SENTENCES[kind].severity)(text, kind)
 
     def _publish(self, estimate: Estimate) -> None:
         """Publish what is new, the figures before the flag that they explain."""
@@ -324,7 +317,7 @@ class MonitorNode(ParameterNode):
             self._state_publisher.publish(String(data=state))
 
     def _publish_figures(self, estimate: Estimate) -> None:
-        figures = {name: float(getattr(estimate, name)) for name in _FIGURES}
+        figures = {name: float(getattr(estimate, name)) for name in FIGURES}
         self._figures = {name: value for name, value in figures.items() if math.isfinite(value)}
         self._details = details(estimate)
         for name, value in self._figures.items():
@@ -339,7 +332,6 @@ class MonitorNode(ParameterNode):
 
     def _report(self) -> None:
         """Once a second; a second without samples means that nothing is known any more."""
-        self._log.look()
         if self._subscription.adapt():
             lost = 'so what gets lost is not sent again'
             self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')

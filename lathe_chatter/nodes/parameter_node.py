@@ -13,12 +13,14 @@ from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent, ParameterType, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lathe_chatter.errors import ParameterError, UnknownParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
 from lathe_chatter.nodes.command_line_parameters import OF_QOS, OF_RCLPY
+from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 from lathe_chatter.nodes.polled_subscription import is_polled
 from lathe_chatter.nodes.real_time_loop import RequestLoad
@@ -35,6 +37,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         options: As for `rclpy.node.Node`.
 
     Attributes:
+        bounded_log: Its logger, bounded for each kind of sentence.
         requests: What serving them takes.
         set_together: Names in the request that is being served, as of a dump that is loaded:
             rclpy sets them one by one.
@@ -52,6 +55,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         self.requests = RequestLoad()
         self.set_together: frozenset[str] = frozenset()
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
+        self.bounded_log = BoundedLog(QuickLog(self.get_logger()))
         if hasattr(self.context, 'untrack_node'):
             # From Kilted on a context ends its nodes, one too whose making was given up half-way.
             self.context.untrack_node(self)
@@ -63,6 +67,9 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                 self.declare_parameter(row.name, value, descriptor_of(row), ignore_override=True)
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._accept)
+        self.create_timer(
+            1.0, self.bounded_log.look, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     @property
     def values(self) -> Mapping[str, Value]:
@@ -88,9 +95,13 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         """Put on disk what must be kept, before the node goes. Does nothing by itself."""
 
     def destroy_node(self) -> None:
-        """Finish, and go."""
+        """Finish, say what is still to be said, and go."""
         try:
             self.finish()
+            if hasattr(
+                self, 'bounded_log'
+            ):  # Kilted destroys nodes, too, that were refused half-made
+                self.bounded_log.end()
         finally:
             super().destroy_node()
 
@@ -118,8 +129,12 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         converted = [self._converted(parameter) for parameter in parameter_list]
         refusal = self._refusal(converted)
         if refusal:
-            return SetParametersResult(successful=False, reason=refusal)
-        return super().set_parameters_atomically(converted)
+            result = SetParametersResult(successful=False, reason=refusal)
+        else:
+            result = super().set_parameters_atomically(converted)
+        if not result.successful:  # who asked is told; who reads the log or the record is, too
+            self.bounded_log.warning(f'Refused: {result.reason}', 'refused')
+        return result
 
     def declare_parameters(
         self,

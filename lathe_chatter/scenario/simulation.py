@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
+from lathe_chatter.detection.estimate import FIGURES
 from lathe_chatter.detection.speed_adviser import speeds_to_recommend
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import (
@@ -30,7 +31,6 @@ from lathe_chatter.scenario.scenario import CLEARED, FLAGGED, Scenario, Step
 _BLOCK, _WATCHED_BLOCK = 0.05, 0.01
 """s of samples in one message, without a monitor and with one."""
 _REPORT_PERIOD = 0.02
-_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 _MONITOR = '/chatter_monitor'
 
 Tell = Callable[[float, str], None]
@@ -217,7 +217,7 @@ class _Simulation:
         changed = estimate.state != self._state or estimate.chatter != self._flag
         if changed or estimate.time >= self._next_report:
             self._next_report = estimate.time + _REPORT_PERIOD
-            for name in _FIGURES:
+            for name in FIGURES:
                 value = float(getattr(estimate, name))
                 if math.isfinite(value):
                     self._run.publish(f'{_MONITOR}/{name}', 'std_msgs/msg/Float64', data=value)

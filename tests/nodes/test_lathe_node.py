@@ -225,6 +225,19 @@ def test_a_refused_set_has_a_reason_and_changes_nothing(
     assert taken(bench, messages, 3).tobytes() == VirtualLathe().advance(3 * TICK).tobytes()
 
 
+def test_a_refused_set_is_in_the_log(start: Callable[..., Any], bench: Bench) -> None:
+    log = bench.listen_first(Log, '/rosout', LATCHED)
+    start(LatheNode)
+    bench.set('/lathe', depth_of_cut=5.0)
+    bench.set_together('/lathe', spindle_speed_rpm=6000.0, seed=2)
+    bench.set('/lathe', depth_of_cut=0.001)
+    bench.spin_until(lambda: any(parse_change(entry.msg) for entry in log), 'the last')
+    assert [entry.msg for entry in log if entry.msg.startswith('Refused')] == [
+        'Refused: depth_of_cut is 5.0 m: it must be a finite number from 0 to 0.1 m.',
+        'Refused: seed can be given at the start only.',
+    ]
+
+
 @pytest.mark.usefixtures('lathe')
 def test_a_value_of_an_unknown_type_is_refused_and_survived(bench: Bench) -> None:
     for name in ('depth_of_cut', 'no such name', ''):

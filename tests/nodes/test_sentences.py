@@ -197,6 +197,10 @@ SAID = {
         ),
     },
     'parameter_node.py': {
+        'Refused: {}': (
+            'a set was not accepted, for the reason that its answer has; bounded in a flood',
+            f'{LATHE}::test_a_refused_set_is_in_the_log',
+        ),
         '{} can be given at the start only.': (
             'the parameter exists, and is no run-time one',
             f'{LATHE}::test_a_refused_set_has_a_reason_and_changes_nothing',
@@ -270,7 +274,8 @@ NO_SENTENCE = {
     'step time max, us', 'lateness p99, us', 'lateness max, us', 'behind the clock, s',
     'requests in the last second', 'time taken by requests, fraction', 'simulated time, s',
     'bearing contact', 'bearing engaged, fraction of ticks', 'tool in cut, fraction of ticks',
-    'spindle speed, rev/min', 'depth of cut, m', 'bearing clearance, m', 'time 0 on /clock, s',
+    'spindle speed, rev/min', 'spindle speed asked for, rev/min', 'depth of cut, m',
+    'bearing clearance, m', 'time 0 on /clock, s',
 }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lathe_chatter.detection.estimate import FIGURES
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import Knock
@@ -67,6 +68,14 @@ def test_the_shipped_story_is_told_without_ros(tmp_path: Path) -> None:
         assert root.real < 0.0
     assert len(told) == 5
     assert told[2].startswith('advice: try ')
+
+
+def test_what_is_known_of_a_cut_is_published_as_by_the_node(tmp_path: Path) -> None:
+    given = {'force_noise': 0.01}
+    simulate(Scenario('a', 'a', 8.0, given), tmp_path / 'run', monitor=True)
+    topics = {name for name in read_run(tmp_path / 'run').topics if '/chatter_monitor/' in name}
+    figures = {*FIGURES} - {'recommended_speed_rpm'}  # nothing chatters
+    assert topics == {f'/chatter_monitor/{name}' for name in ('chatter', 'state', *figures)}
 
 
 def test_a_lathe_that_ends_says_why(tmp_path: Path) -> None:
