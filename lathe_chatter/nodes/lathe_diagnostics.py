@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from typing import NamedTuple
@@ -73,6 +74,7 @@ class TickStatistics:
         self._steps = Durations()
         self.lateness = Durations()
         self._before = _Mark(0, 0, 0.0, 0, 0, time.monotonic_ns())
+        self._turned, self._speed = (0.0, 0.0), math.nan
         self.begin_second()
 
     def note_tick(self, duration: int, lathe: VirtualLathe) -> None:
@@ -81,6 +83,9 @@ class TickStatistics:
         self._steps.add(duration)
         self._engaged += lathe.bearing_engaged
         self._in_cut += lathe.tool_in_cut
+        before, self._turned = self._turned, (lathe.time, lathe.spindle_angle)
+        passed, turns = self._turned[0] - before[0], self._turned[1] - before[1]
+        self._speed = 60.0 * turns / passed if passed > 0.0 else math.nan  # nan after a reset
 
     @property
     def behind(self) -> bool:
@@ -180,14 +185,15 @@ class TickStatistics:
         """The status of the cut."""
         made = self.ticks - self._before.ticks
         ticks = max(1, made)
-        cut = lathe.cut
+        cut, asked = lathe.cut, lathe.cut.spindle_speed_rpm
         values = {
             'simulated time, s': lathe.time,
             'bearing contact': cut.bearing_contact.value,
             'bearing engaged, fraction of ticks': self._engaged / ticks,
             'tool in cut, fraction of ticks': self._in_cut / ticks,
             'guard': control.ended_because or 'not tripped',
-            'spindle speed, rev/min': cut.spindle_speed_rpm,
+            'spindle speed, rev/min': self._speed if math.isfinite(self._speed) else asked,
+            'spindle speed asked for, rev/min': asked,
             'depth of cut, m': cut.depth_of_cut,
             'bearing clearance, m': cut.bearing_clearance,
             'resets': control.resets,

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut as ModelCut
 from lathe_chatter.nodes.lathe_diagnostics import Durations, TickStatistics
@@ -62,6 +64,22 @@ def test_the_verdict_on_the_pace_says_what_is_wrong_first() -> None:
     assert cut.pace() == 'flooded: requests take much of the time'
     cut.statistics.begin_second()
     assert cut.pace() == 'paused'
+
+
+def test_the_speed_is_the_one_that_the_spindle_turns_with() -> None:
+    cut = Cut(VirtualLathe(spindle_acceleration=1000.0))
+    for _ in range(2):
+        cut.tick()
+    cut.lathe.retune(cut.lathe.cut.with_changes(spindle_speed_rpm=5000.0))
+    for _ in range(100):  # 0.2 s
+        cut.tick()
+    values = cut.statistics.cutting(cut.control, cut.lathe).values
+    assert values['spindle speed, rev/min'] == pytest.approx(3199.0, abs=0.2)
+    assert values['spindle speed asked for, rev/min'] == 5000.0
+    cut.lathe = VirtualLathe()  # a reset
+    cut.tick()
+    values = cut.statistics.cutting(cut.control, cut.lathe).values
+    assert values['spindle speed, rev/min'] == 3000.0
 
 
 def test_the_status_of_the_cut_claims_no_more_than_the_ticks_showed() -> None:
