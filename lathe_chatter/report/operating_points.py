@@ -159,8 +159,9 @@ def draw_path(axes: Axes, history: History, chart: ChartOf) -> None:
     for stay in here:
         x, y = _point(stay.cut)
         axes.plot(
-            x, y, 'o', ms=15, color='k', mfc=ALARM if stay.chatter else 'white', mew=1.2, zorder=5
-        )
+            x, y, 'o', ms=15, color='k', mfc=ALARM if stay.chatter else 'white', mew=1.2, zorder=5,
+            clip_on=False,  # whole, also at the border
+        )  # fmt: skip
         axes.annotate(str(stay.number), (x, y), ha='center', va='center', fontsize=9, zorder=6)
     axes.plot([], [], 'o', color='k', mfc='white', label='operating point, in order')
     if any(stay.chatter for stay in here):

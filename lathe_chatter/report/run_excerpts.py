@@ -133,8 +133,8 @@ def excerpts_of(history: History) -> list[Excerpt]:
     first = disturbances[0] if disturbances else min(history.begin + periods, end)
     wanted = [('before the first change' if disturbances else 'at the start', first)]
     spans = [span for span in history.chatter_spans() if span[1] > history.begin]
-    if spans:
-        start, stop = spans[0]
+    if spans:  # a short one may be a false alarm
+        start, stop = max(spans, key=lambda span: span[1] - span[0])
         inside = [time for time in disturbances if start < time < stop]
         wanted.append(('chatter', inside[0] if inside else stop))
     if end > wanted[-1][1]:

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _LABEL_WIDTH = 0.12
 """Of the picture, that a label above it takes."""
+_LONG = 16
+"""Letters in a line of such a label."""
 _HIGHEST = 160
 """Points above the plot up to which labels stand: more would leave no room to the plots."""
 _GAPS = 200
@@ -198,7 +200,9 @@ def _label_changes(axes: Axes, history: History) -> None:
             left_out += 1
             continue
         last, height = time, above
-        late = time > history.duration - 0.5 * _LABEL_WIDTH * length
+        # A long one would take the plots their room on the right.
+        long = max(map(len, text.split('\n'))) > _LONG
+        late = long and time > history.duration - 0.5 * _LABEL_WIDTH * length
         axes.annotate(
             text, (time, 1.0), (-3 if late else 3, height), xycoords=('data', 'axes fraction'),
             textcoords='offset points', fontsize=9, va='bottom', color=colour,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from lathe_chatter.cli import main as cli
@@ -95,3 +96,20 @@ def test_the_probability_of_an_operating_point(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_a_chart_says_what_it_is_drawn_for(changes: dict[str, object], said: str) -> None:
     assert bearing_text(Cut(**changes)) == said  # type: ignore[arg-type]  # fields of a cut
+
+
+def test_an_operating_point_at_the_border_is_whole(tmp_path: Path) -> None:
+    """As one that is faster than the spindle can: the chart ends there."""
+    machine = HEAVY.replace('spindle_speed: 30 rpm', 'spindle_speed: 110 rpm')
+    machine = machine.replace(', errors: {cutting_coefficient: 15 %}', '')
+    history = recorded(machine, '1', tmp_path)
+    axes = Figure().add_subplot()
+    draw_path(axes, history, *charts_of(history))
+    (point,) = (line for line in axes.lines if line.get_marker() == 'o' and len(line.get_xdata()))
+    assert point.get_xdata() == [axes.get_xlim()[1]]
+    picture = FigureCanvasAgg(axes.figure)
+    picture.draw()
+    beyond = round(axes.bbox.x1 + 0.5 * point.get_markersize() * axes.figure.dpi / 72.0)
+    height = picture.get_width_height()[1]
+    row = round(height - axes.transData.transform(point.get_xydata()[0])[1])
+    assert np.asarray(picture.buffer_rgba())[row, beyond - 2 : beyond + 1, :3].min() < 128

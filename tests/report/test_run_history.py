@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import Change
 from lathe_chatter.model import Cut, Machine
+from lathe_chatter.report.monitor_record import Flag
 from lathe_chatter.report.plotted_samples import RunSamples
 from lathe_chatter.report.run_excerpts import excerpts_of
 from lathe_chatter.report.run_history import History
@@ -78,3 +80,13 @@ def test_a_settled_figure_is_no_first_guess() -> None:
     assert run.settled('frequency', 1.0, 2.0) == 207.2
     assert math.isnan(run.settled('frequency', 1.5, 2.0))
     assert math.isnan(run.settled('growth_rate', 1.0, 2.0))
+
+
+def test_of_several_alarms_the_longest_is_looked_at_closely() -> None:
+    """A short one may be a false alarm."""
+    lathe = VirtualLathe()
+    run = history([lathe.advance(20_000)], [], 0.0)
+    times = ((0.5, True), (0.52, False), (1.0, True), (1.6, False))
+    run = replace(run, flags=[Flag(time, up) for time, up in times])
+    _, chatter, _ = excerpts_of(run)
+    assert (chatter.title, chatter.until) == ('chatter', 1.6)

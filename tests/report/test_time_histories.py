@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.change_and_knock_sentences import Knock
+from lathe_chatter.lathe.change_and_knock_sentences import Change, Knock
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.report.plotted_samples import RunSamples
 from lathe_chatter.report.run_history import History
@@ -73,3 +73,20 @@ def test_labels_of_much_that_happens_leave_room_to_the_plots() -> None:
     labels = [text.get_text() for text in panels[0].texts]
     assert f'{200 - len(labels)} more are in the table' == panels[0].get_title(loc='left')
     assert all(axes.get_position().height > 0.05 for axes in panels)
+
+
+@pytest.mark.parametrize(
+    ('change', 'side'), [({'depth_of_cut': 1e-3}, 'left'), ({'workpiece_diameter': 0.06}, 'right')]
+)
+def test_a_short_label_begins_at_its_line_also_at_the_end(
+    change: dict[str, float], side: str
+) -> None:
+    lathe = VirtualLathe()
+    samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(5000).T, strict=True))
+    run = History(
+        Path('run'), Machine(), Cut(), RunSamples.of(samples), [Change(0.495, {}, change)]
+    )
+    panels = Figure(figsize=(12.0, 9.0), layout='constrained').subplots(4)
+    draw_time_histories(panels, run)
+    (label,) = panels[0].texts
+    assert label.get_horizontalalignment() == side
