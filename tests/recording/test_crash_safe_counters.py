@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -84,6 +85,21 @@ def test_a_run_that_was_finished_has_no_counts(tmp_path: Path) -> None:
         assert taken(tmp_path / 'run') == {1: (1, 7)}
     assert not (tmp_path / 'run' / FILE_NAME).exists()
     assert verify(tmp_path / 'run').findings == []
+
+
+def test_the_counts_are_laid_out_as_the_format_of_a_run_says(tmp_path: Path) -> None:
+    """docs/reference/run_format.md: others read it too."""
+    counts = UnfinishedCounts(tmp_path)
+    for channel, when in ((1, 7), (3, 10**18), (3, 10**18 + 1)):
+        counts.count(channel, when)
+    data = (tmp_path / FILE_NAME).read_bytes()
+    assert len(data) == 65536
+    assert data[:16] == b'lathe_chatter 1\n'
+    entries = [*struct.iter_unpack('<QQ', data[16:])]
+    assert len(entries) == 4095
+    assert entries[:4] == [(0, 0), (1, 7), (0, 0), (2, 10**18 + 1)]
+    assert set(entries[4:]) == {(0, 0)}
+    counts.close(finished=False)
 
 
 @pytest.mark.parametrize('data', [b'', b'what', bytes(1 << 16)])
