@@ -101,6 +101,7 @@ TOLD_ELSEWHERE = {
     'Interrupted: the run above is recorded up to that moment.': 'test_run.py',
     'Interrupted: what was drawn is removed again.': 'test_reproduce.py',
     'Interrupted: the same call goes on from ': 'test_sentences.py',
+    ', and the same call goes on from them.': 'dataset/test_generation.py',
     ' verdicts agree. Growth rates in 1/s': 'test_reproduce.py',
     'The simulated time went back to zero ': 'recording/test_recorded_cuts.py',
     'stable with ': 'test_charts.py',
