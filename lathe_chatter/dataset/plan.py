@@ -130,9 +130,7 @@ class Plan:
     @property
     def drawn(self) -> list[str]:
         """The parameters that differ from window to window, in the order of the table."""
-        names = {'spindle_speed_rpm', 'depth_of_cut'}.union(
-            *(each.changes for each in self.events)
-        )
+        names = {'spindle_speed_rpm', 'depth_of_cut', *(n for e in self.events for n in e.changes)}
         names |= {n for n, how in (self.machine | self.cut).items() if len(how.values) > 1}
         return [row.name for row in LATHE if row.name in names - {MACHINE_FILE.name}]
 
@@ -197,9 +195,8 @@ def _machine(section: Section, path: Path) -> dict[str, Any]:
         try:
             described = {s: load_machine(p if p.is_file() else s) for s, p in places.items()}
         except MachineFileError as error:
-            line = section.nodes[MACHINE_FILE.name].start_mark.line + 1
-            said = f'{section.file}, line {line}: machine.machine: {error}'
-            raise MachineFileError(said) from None
+            said, node = str(error).rstrip('.'), section.nodes['machine']
+            raise section.refused(said, node, 'machine') from None
         texts = tuple(described[source].text() for source in given.values)
         drawn[MACHINE_FILE.name] = given._replace(values=texts)
     firsts, doubts = {name: how.values[0] for name, how in drawn.items()}, list[str]()
@@ -283,8 +280,7 @@ def _distribution(
     if not isinstance(node, yaml.MappingNode):
         return Distribution(CHOICE, (section.value(name, node, row),), limits, of_limit)
     inner = section.inner(name)
-    others = [FACTOR.name] if name == 'depth_of_cut' else []
-    inner.only(UNIFORM, LOG_UNIFORM, NORMAL, CHOICE, *others)
+    inner.only(UNIFORM, LOG_UNIFORM, NORMAL, CHOICE, *[FACTOR.name] * (name == 'depth_of_cut'))
     if len(inner.nodes) != 1:
         raise inner.refused('it must have one way in which it is drawn')
     ((kind, given),) = inner.nodes.items()

@@ -45,9 +45,12 @@ class Section:
                 raise self.refused(f'{key.value!r} stands there twice', key)
             self.nodes[key.value] = value
 
-    def refused(self, text: str, node: yaml.Node | None = None) -> MachineFileError:
-        """The error that says what is wrong, at a node or at the whole section."""
-        where = f'{self.path}: ' if self.path else ''
+    def refused(
+        self, text: str, node: yaml.Node | None = None, field: str = ''
+    ) -> MachineFileError:
+        """The error that says what is wrong, at a node, a field or at the whole section."""
+        path = '.'.join(filter(None, (self.path, field)))
+        where = f'{path}: ' if path else ''
         line = (node or self._node).start_mark.line + 1
         return MachineFileError(f'{self.file}, line {line}: {where}{text}.')
 
