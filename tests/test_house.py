@@ -135,6 +135,26 @@ def test_every_arrow_is_used_and_none_runs_up() -> None:
         assert ARROWS[room] <= used, room
 
 
+def test_the_picture_of_the_architecture_is_that_of_the_arrows() -> None:
+    text = (ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
+    drawn: dict[str, int] = {}
+    floor = 0
+    for line in text.partition('```text\n')[2].partition('```')[0].splitlines():
+        number, names = line[:3].strip(), line[3:].split()
+        floor = int(number) if number else floor
+        drawn |= dict.fromkeys(names, floor)
+    floors: dict[str, int] = {}
+    for room, below in ARROWS.items():
+        floors[room] = 1 + max((floors[each] for each in below), default=0)
+    assert drawn == floors
+    table = text.partition('| package |')[2].partition('\n\n')[0]
+    first = re.findall(r'^\|.*?\|', table, re.MULTILINE)
+    described = set(re.findall(r'`(\w+)`', ''.join(first)))
+    assert described >= {*ARROWS}
+    base = text.partition('for everybody: ')[2].partition('.\n')[0]
+    assert set(re.findall(r'`(\w+)`', base)) == BASE
+
+
 def test_modules_import_each_other_in_no_circle() -> None:
     graph = {
         file: {there for name, types in imported(file) if not types and (there := file_of(name))}

@@ -31,9 +31,15 @@ _PACES = 32.0
 """Samples over which the pace of a signal is followed; the slow one over 32 times as many."""
 _RAIL, _RAIL_RUN, _RAIL_HITS, _RAIL_STEPS = 1.0, 3, 4, 4.0
 """s between meetings of a rail, samples spent at it, meetings, smallest steps it is met with."""
-_CAUSES = ('is not a number', 'stands still', 'is cut off at a limit of its range')
-_BITS = len(_CAUSES).bit_length()
-"""Of the number of a cause, from 1 on; 0 is none."""
+_NO_NUMBER, _STANDS_STILL, _AT_RAIL = 1, 2, 3
+CAUSES = {
+    _NO_NUMBER: 'is not a number',
+    _STANDS_STILL: 'stands still',
+    _AT_RAIL: 'is cut off at a limit of its range',
+}
+"""What can be wrong with a channel, in words, by number; 0 is nothing."""
+_BITS = max(CAUSES).bit_length()
+"""Of such a number."""
 _NEVER = -1e300
 
 
@@ -58,7 +64,7 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
         return ()
     numbers = (causes >> _BITS * place & (1 << _BITS) - 1 for place in range(len(names)))
     found = zip(names, numbers, strict=True)
-    return tuple(f'{name} {_CAUSES[cause - 1]}' for name, cause in found if name and cause)
+    return tuple(f'{name} {CAUSES[cause]}' for name, cause in found if name and cause)
 
 
 @compiled(borrows=True, inner=True)
@@ -84,9 +90,10 @@ def _causes(channels: Records, time: float) -> int:
     for number in range(3):
         channel = channels[number]
         if time - channel.bad_at < _AFTERWARDS:
-            causes += (1 + (channel.stood_still != 0)) << _BITS * number
+            cause = _STANDS_STILL if channel.stood_still != 0 else _NO_NUMBER
+            causes += cause << _BITS * number
         elif time - channel.rail_at < _RAIL:
-            causes += 3 << _BITS * number
+            causes += _AT_RAIL << _BITS * number
     return causes
 
 
@@ -101,7 +108,7 @@ def watch_channels(rows: Array, channels: Records) -> int:
 
     Returns:
         What is wrong after the last row: `_BITS` bits for each channel, the lowest for the first:
-        0 for nothing, else the number of a cause, from 1 on.
+        0 for nothing, else a number of `CAUSES`.
     """
     for i in range(rows.shape[0]):
         time, well = rows[i, 0], 0.0

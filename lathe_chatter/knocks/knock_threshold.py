@@ -45,7 +45,9 @@ class KnockLimit:
             seen to last; 0 for an unstable cut, nan where none was found.
         survived: The magnitude below it that was seen to die out in its direction, N s.
         linear: The magnitude below which nothing can last, as the cut stays linear, N s.
-        searched: The largest magnitude that was tried, N s.
+        searched: The magnitude up to which both directions were looked through, N s: that of the
+            first that lasted, before it was bisected, or up to which every one died out; 0 for an
+            unstable cut, infinite where nothing is cut.
         amplitude: Of the tool in the chatter that it ends in, peak to peak, m.
         trials: Knocks that were simulated.
     """

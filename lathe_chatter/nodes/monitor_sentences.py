@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from lathe_chatter.detection import Estimate
+from lathe_chatter.detection.channel_watch import CAUSES
 from lathe_chatter.nodes.polled_subscription import several_publish
 
 
@@ -76,8 +77,7 @@ SENTENCES = {
     ),
     'sensors': Sentence(
         'warning',
-        _AT + r'.+ (is not a number|stands still|is cut off at a limit of its range)'
-        r'; works with: .+\.',
+        _AT + rf'.+ ({"|".join(CAUSES.values())}); works with: .+\.',
         'a channel that the labels name has been so within the last second',
     ),
     'sensors well': Sentence(
