@@ -34,6 +34,7 @@ html_title = f'lathe_chatter {release}'
 html_static_path = ['_static']
 html_css_files = ['site.css']
 exclude_patterns = ['_build', 'reference/_made', '**/README.*', 'auto_examples/*.ipynb']
+exclude_patterns += ['sg_execution_times.rst', 'auto_examples/sg_execution_times.rst']
 suppress_warnings = ['config.cache']  # the gallery's sorting is a function
 
 myst_enable_extensions = ['dollarmath', 'colon_fence']
@@ -54,7 +55,7 @@ sphinx_gallery_conf = {
     'ignore_pattern': r'(^|/)(?!plot_)[^/]*\.py$',  # what needs a data set or a file first
     'abort_on_example_error': True,
     'remove_config_comments': True,
-    'show_memory': False,
+    'write_computation_times': False,
     'download_all_examples': False,
 }
 
