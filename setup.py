@@ -11,9 +11,12 @@ CONFIG = sorted(
     folder for folder in [Path('config'), *Path('config').rglob('*')] if folder.is_dir()
 )
 
+PACKAGE = ET.parse(SOURCES / 'package.xml').getroot()
+
 setup(
     name=NAME,
-    version=ET.parse(SOURCES / 'package.xml').getroot().findtext('version'),
+    version=PACKAGE.findtext('version'),
+    maintainer=PACKAGE.findtext('maintainer'),
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed'],

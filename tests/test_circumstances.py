@@ -34,6 +34,7 @@ def test_a_missing_ros_is_said_before_anything_is_compiled(start: str, tmp_path:
     )
     assert done.returncode == 2, done.stderr
     assert 'ROS 2 is not there' in done.stderr
+    assert '`make run`' in done.stderr
     assert 'Traceback' not in done.stderr
     assert 'Compiling' not in done.stdout + done.stderr
     assert not (tmp_path / 'cache').exists()

@@ -68,8 +68,13 @@ def test_package_xml_is_valid_and_every_version_is_its() -> None:
     assert root.findtext('version') == shown == lathe_chatter.__version__
 
 
-def test_changelog_has_the_version() -> None:
-    assert f'\n{lathe_chatter.__version__} (' in (ROOT / 'CHANGELOG.rst').read_text()
+def test_the_newest_section_of_the_changelog_is_as_catkin_and_bloom_expect() -> None:
+    """`Forthcoming`, which catkin_prepare_release renames, or the version with its date."""
+    text = (ROOT / 'CHANGELOG.rst').read_text()
+    version = re.escape(lathe_chatter.__version__)
+    first = re.search(r'^(.+)\n-+\n\* ', text, re.MULTILINE)
+    assert first is not None
+    assert re.fullmatch(rf'Forthcoming|{version} \(\d{{4}}-\d\d-\d\d\)', first[1])
 
 
 def imported_packages() -> set[str]:
@@ -186,6 +191,13 @@ def test_ros2_run_finds_the_executables_after_pip_install(sources: Path, tmp_pat
     assert 'depth_of_cut' in started.stderr
     assert 'Traceback' not in started.stderr
     assert started.returncode == 2
+    without = "import sys; sys.modules['rclpy'] = None"
+    start = 'from lathe_chatter.nodes.entry_points import lathe; lathe()'
+    missing = run(
+        [sys.executable, '-c', f'{without}; {start}'], cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(installed)},
+    )  # fmt: skip
+    assert missing.stderr.endswith('source an installation.\n'), 'it has no Makefile'
 
 
 def test_ros2_run_finds_the_executables_after_colcon_build(sources: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from pathlib import Path
 
 from lathe_chatter.nodes.end_signals import exit_on_end_signals
 from lathe_chatter.standard_streams import hold_standard_streams
@@ -46,10 +47,9 @@ def operator_page() -> None:
 
 def no_ros(error: ImportError) -> str:
     """What to say where a package of ROS 2 cannot be imported."""
-    return (
-        f'ROS 2 is not there ({error}): source an installation, or use `make run`, which '
-        'installs what it needs.'
-    )
+    checkout = (Path(__file__).parents[2] / 'Makefile').is_file()
+    make = ', or use `make run`, which installs what it needs' if checkout else ''
+    return f'ROS 2 is not there ({error}): source an installation{make}.'
 
 
 def _run(module: str) -> None:
