@@ -28,7 +28,7 @@ from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step, find_scenario, load_scenario
 from lathe_chatter.scenario.player import ScenarioPlayer
-from lathe_chatter.scenario.scenario import ASKED
+from lathe_chatter.scenario.scenario import ASKED, CLEARED, FLAGGED
 from lathe_chatter.supervisor import ASKS
 
 FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
@@ -41,6 +41,11 @@ _STALE = 1.0
 """Simulated s after which a figure that does not come again is not known any more."""
 _CLOSEUP_PERIOD, _LOOK_PERIOD = 0.25, 0.5
 _SHOWN_SENTENCES = 80
+_WAITS = {
+    FLAGGED: 'when chatter is flagged',
+    CLEARED: 'when the flag is cleared',
+    ASKED: 'when the supervisor asks',
+}
 
 
 class OperatedCell:
@@ -62,6 +67,8 @@ class OperatedCell:
         self.clients = CellClients(node, lathe, self.board.put)
         self.playing: Scenario | None = None
         self._player: ScenarioPlayer | None = None
+        self._before: dict[str, Any] | None = None
+        self._changed_by_hand = False
         self._heard, self._names = heard, self.clients.names
         self._samples_name = f'{lathe}/samples'
         self._decoder = SampleDecoder()
@@ -157,6 +164,7 @@ class OperatedCell:
 
     def _on_action(self, message: String) -> None:
         self.board.put('action', message.data)
+        self.board.put('asked', ASKS in message.data)
         if self._player is not None and ASKS in message.data:
             self._player.notice(ASKED, self._signals.time)
 
@@ -176,6 +184,8 @@ class OperatedCell:
         self.board.put('alive', alive)
         statuses = self._heard.statuses
         self.board.put('statuses', {who: statuses.get(n, {}) for who, n in self._names.items()})
+        if not (alive['lathe'] and alive['supervisor']):
+            self.board.put('asked', value=False)
         self._run(self.clients.look())
         values = self.clients.values.get('lathe')
         if not values or self._charting:
@@ -209,7 +219,7 @@ class OperatedCell:
         signals = self._signals
         self.board.put('figures', self._figures_now())
         header['cell'] = self.board.news(viewer.seen.setdefault('cell', {}))
-        if not signals.envelopes:
+        if not (signals.envelopes or signals.emptied):
             return
         if viewer.cursors.get('epoch') != signals.epoch:
             viewer.cursors.update(epoch=signals.epoch, firsts=[0, 0])
@@ -219,7 +229,8 @@ class OperatedCell:
             firsts[k] = first + values.shape[1]
             spans.append([first, values.shape[1], envelope.samples * signals.step])
             arrays[f'envelope_{k}'] = values
-        shown = {'epoch': signals.epoch, 'time': signals.time, 'lost': signals.lost}
+        time_now = signals.time if signals.envelopes else None
+        shown = {'epoch': signals.epoch, 'time': time_now, 'lost': signals.lost}
         header['signals'] = {**shown, 'spans': spans}
         at = time.monotonic()
         if at >= self._closeup_at and self._closeup[0] != signals.time:
@@ -237,21 +248,38 @@ class OperatedCell:
         Raises:
             LatheChatterError: If it is refused.
         """
+        said = ''
         match wish['do']:
             case 'set':
                 await self.clients.set(wish['node'], dict(wish['values']))
-                return ''
+                self._changed_by_hand |= wish['node'] == 'lathe' and self.playing is None
+            case 'back':
+                said = await self._go_back()
             case 'knock':
+                if self._pace() == 'ended':
+                    raise LatheChatterError('The cut has ended: nothing was hit.')
                 # One that was killed is on its topic for long still, and nothing answers for it.
                 self.clients.knock(wish['impulse'], there=self._is_alive('lathe'))
-                return f'Knocked with {wish["impulse"] * 1e3:g} mN s.'
+                said = f'Knocked with {wish["impulse"] * 1e3:g} mN s.'
             case 'play':
-                return await self._begin(load_scenario(find_scenario(str(wish['scenario']))))
+                said = await self._begin(load_scenario(find_scenario(str(wish['scenario']))))
             case 'stop_playing':
                 self._end_scenario('is stopped')
-                return ''
             case service:
-                return await self.clients.call(service)
+                said = await self._call(service)
+        return said
+
+    async def _call(self, service: str) -> str:
+        """Call a service, and see to what of it nobody else tells."""
+        if service == 'accept':
+            self.board.put('asked', value=False)  # whatever comes of it
+        if service == 'reset':
+            self._end_scenario('is stopped by the reset')
+        said = await self.clients.call(service)
+        if service == 'reset' and self._pace() == 'paused':  # no sample tells it
+            self._signals.empty()
+            self._figures.clear()
+        return said
 
     async def _begin(self, scenario: Scenario) -> str:
         """Begin a scenario: with its parameters, at time zero."""
@@ -266,12 +294,35 @@ class OperatedCell:
                     f'The scenario {scenario.name} is for a lathe that was started with '
                     f'{row.name} {wanted[row.name]!r:.40}; this one has {values[row.name]!r:.40}.'
                 )
+        if scenario.supervisor is not None and not self._is_alive('supervisor'):
+            raise LatheChatterError(
+                f'The scenario {scenario.name} needs a chatter_supervisor, and none is here: '
+                'lathe-chatter run --page --supervise ask starts one.'
+            )
+        # Of a scenario after a scenario, the cut that somebody had set.
+        if self._before is None or self._changed_by_hand:
+            self._before = {row.name: values[row.name] for row in CUT_ROWS if row.name in values}
+        self._changed_by_hand = False
         await self.clients.set('lathe', {row.name: wanted[row.name] for row in CUT_ROWS})
         for service in ('reset', 'resume'):
             await self.clients.call(service)
         self.playing, self._player = scenario, ScenarioPlayer(scenario)
-        self._show_scenario(f'{scenario.title}: {scenario.duration:g} s.')
+        self._show_scenario('has begun')
         return f'{scenario.name} has begun.'
+
+    async def _go_back(self) -> str:
+        """Set what was set before a scenario, which may have had another noise, or none."""
+        if self._before is None or self.playing is not None:
+            raise LatheChatterError('No scenario has ended that anything could be set back from.')
+        await self.clients.set('lathe', self._before)
+        self._before = None
+        self._put_scenario('The cut is set as before the scenario.')
+        return 'The cut is set as before the scenario.'
+
+    def _pace(self) -> str:
+        """How the lathe goes on, as it has last said."""
+        told = self._heard.statuses.get(self._names['lathe'], {}).get('pace', {})
+        return str(told.get('message', ''))
 
     def _play(self) -> None:
         """Carry out what is due, and end in time."""
@@ -280,7 +331,7 @@ class OperatedCell:
         recommended, _ = self._figures.get('recommended_speed_rpm', (math.nan, 0.0))
         step = self._player.due(self._signals.time, recommended)
         if step is not None:
-            self._show_scenario(f'{self.playing.name}: {step}.')
+            self._show_scenario(step.because or 'a step was made')
             self._run(self._carry_out(step))
         elif self._player.finished and self._signals.time >= self.playing.duration:
             self._end_scenario('is over')
@@ -297,8 +348,22 @@ class OperatedCell:
     def _end_scenario(self, how: str) -> None:
         if self.playing is not None:
             name, self.playing, self._player = self.playing.name, None, None
-            self._show_scenario(f'{name} {how.rstrip(".")}.')
+            self._put_scenario(
+                f'{name} {how.rstrip(".")}. Its cut, and its noise or none, stay set.'
+            )
 
     def _show_scenario(self, text: str) -> None:
-        shown = {'playing': self.playing.name if self.playing else '', 'text': text}
+        """Show what is played, and what it waits for."""
+        if self.playing is None or self._player is None:
+            return
+        step, end = self._player.next_step, f'it ends at {self.playing.duration:g} s'
+        if step is not None:
+            when = f'at {step.at:g} s' if step.at is not None else _WAITS[str(step.when)]
+            later = f', {step.after:g} s later' if step.after else ''
+            end = f'next, {when}{later}: {step.because or "a change"}'
+        self._put_scenario(f'{self.playing.name}: {text}; {end}.')
+
+    def _put_scenario(self, text: str) -> None:
+        playing = self.playing.name if self.playing else ''
+        shown = {'playing': playing, 'text': text, 'before': self._before is not None}
         self.board.put('scenario', shown)

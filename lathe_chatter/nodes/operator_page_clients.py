@@ -132,6 +132,8 @@ class CellClients:
                 if each.name in self.values[who]:
                     self.values[who][each.name] = parameter_value_to_python(each.value)
             self._put(f'{who}_values', dict(self.values[who]))
+            if who == 'lathe':
+                self._put('asked', False)  # noqa: FBT003 -- an offer was for the cut before
 
     async def set(self, who: str, values: Mapping[str, Any]) -> None:
         """Set parameters of a node, all or none.

@@ -32,6 +32,7 @@ from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.page.server import FRAME_PERIOD, PageServer, Viewer
 from lathe_chatter.page.versioned_values import Board
 from lathe_chatter.samples.codec import SAMPLES_TYPE
+from lathe_chatter.scenario import find_scenario, load_scenario
 from lathe_chatter.scenario.scenario import shipped_scenarios
 
 _SPIN_PERIOD = 0.005
@@ -62,7 +63,7 @@ class OperatorPageNode(ParameterNode):
         self.heard = DiagnosticsListener()
         self._board = Board()
         self._board.put('recorded', value=False)
-        self._board.put('scenarios', sorted(shipped_scenarios()))
+        self._board.put('scenarios', {name: _about(name) for name in sorted(shipped_scenarios())})
         self._cells: dict[str, OperatedCell] = {}
         self._left: dict[str, float] = {}
         self._sentences: deque[dict[str, Any]] = deque(maxlen=_MOST_SENTENCES)
@@ -182,6 +183,14 @@ class OperatorPageNode(ParameterNode):
         if cell is None:
             raise LatheChatterError('Choose a lathe first.')
         return await cell.act(wish)
+
+
+def _about(name: str) -> str:
+    """What a scenario is, in sentences."""
+    scenario = load_scenario(find_scenario(name))
+    return (
+        f'{scenario.title}. It takes {scenario.duration:g} s: the lathe begins anew, with its cut.'
+    )
 
 
 def _spin(executor: Executor, node: OperatorPageNode, ended: Callable[[], bool]) -> None:

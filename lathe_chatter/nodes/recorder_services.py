@@ -30,6 +30,9 @@ class Recorder(Protocol):
     def pause(self, *, pause: bool) -> Answer:
         """Leave out what comes, or no longer."""
 
+    def get_logger(self) -> Any:
+        """Where to say what was done."""
+
     def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
         """Create a service."""
 
@@ -48,6 +51,8 @@ def create_services(recorder: Recorder) -> None:
     def answering(act: Callable[[], Answer]) -> Callable[[Any, Any], Any]:
         def answer(_request: Any, response: Any) -> Any:
             response.success, response.message = act()
+            if response.success and act is not start:  # which has said so itself
+                recorder.get_logger().info(response.message)
             return response
 
         return answer

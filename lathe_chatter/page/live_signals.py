@@ -69,6 +69,7 @@ class LiveSignals:
         epoch: Counts the times that simulated time began anew.
         time: Simulated time of the newest sample, s; nan before the first.
         step: From sample to sample, s.
+        emptied: Whether nothing has come since `empty`.
         lost: Samples that did not come, in this epoch.
         envelopes: Of the last seconds, and of the last minute.
     """
@@ -76,15 +77,22 @@ class LiveSignals:
     def __init__(self) -> None:
         """Begin with none."""
         self.epoch = 0
+        self.emptied = False
         self._columns: tuple[str, ...] = ()
         self._begin()
 
     def _begin(self) -> None:
         self.epoch += 1
+        self.emptied = False
         self.time, self.step, self.lost = math.nan, 0.0, 0
         self.envelopes: list[Envelope] = []
         self._newest = -1
         self._recent: deque[Array] = deque()
+
+    def empty(self) -> None:
+        """Forget a cut that begins anew, though nothing of the new one has come."""
+        self._begin()
+        self.emptied = True
 
     def add(self, samples: Array, columns: Sequence[str]) -> bool:
         """Take samples (n, k) that follow each other; whether time began anew with them."""

@@ -36,9 +36,14 @@ class ScenarioPlayer:
         return not self._steps
 
     @property
+    def next_step(self) -> Step | None:
+        """The next step, None after the last."""
+        return self._steps[0] if self._steps else None
+
+    @property
     def next_time(self) -> float:
         """Simulated time of the next step, s; infinite where it waits for the monitor."""
-        at = self._steps[0].at if self._steps else None
+        at = self.next_step.at if self.next_step else None
         return math.inf if at is None else at
 
     def notice(self, word: str, time: float) -> None:
@@ -76,7 +81,7 @@ class ScenarioPlayer:
             recommended_speed: That the monitor recommends, rev/min; nan where there is none. A
                 step that wants it waits for it, and gets it as a machinist would set it.
         """
-        step = self._steps[0] if self._steps else None
+        step = self.next_step
         if step is None or not self._is_due(step, time):
             return None
         changes = dict(step.changes)

@@ -103,9 +103,7 @@ def test_a_refusal_is_read_and_the_control_goes_back(browser: Browser) -> None:
     browser.enter('#p-depth_of_cut', '5000')
     refusal = 'document.querySelector(".refusal:not(:empty)")?.textContent'
     said = browser.until(refusal, 'the refusal')
-    assert said == (
-        'depth_of_cut is 5.0 m: it must be a finite number from 0 to 0.1 m. That is 0 to 100 mm.'
-    )
+    assert said == ('5000 mm: it must be a finite number from 0 to 100 mm. Nothing was changed.')
     shown = browser.run('Number(document.querySelector("#p-depth_of_cut").value)')
     assert shown == pytest.approx(1e3 * before)
     assert value_of(browser, 'depth_of_cut') == before
@@ -113,20 +111,22 @@ def test_a_refusal_is_read_and_the_control_goes_back(browser: Browser) -> None:
 
 def test_a_cut_that_has_ended_says_so_and_begins_anew(browser: Browser) -> None:
     operate(browser)
-    browser.enter('#impulse', '1e8')
-    browser.click('#knock')
+    browser.run('act({do: "knock", impulse: 1e5})')
     told = browser.until(
         '/Reset/.test(document.querySelector("#gone").textContent) && '
         'document.querySelector("#gone").textContent', 'how it goes on'
     )  # fmt: skip
     assert 'displacement' in told
     browser.until(f'{LAMP} === "unknown"', 'that nothing is known of it')
-    assert browser.text('#health') == 'The cut has ended.'
+    health = 'document.querySelector("#health").textContent'
+    browser.until(f'{health} === "The cut has ended."', 'that it has ended')
+    browser.click('#knock')
+    said = 'document.querySelector("#notice").textContent'
+    browser.until(f'{said} === "The cut has ended: nothing was hit."', 'that nothing was hit')
     browser.click('[data-call=reset]')
     browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
     browser.until('document.querySelector("#gone").hidden', 'nothing amiss', PATIENCE)
     assert browser.run('document.querySelector("#lamp-since").textContent') == ''
-    browser.enter('#impulse', '2')
 
 
 def test_pause_step_knock_and_recording(page: Page, browser: Browser) -> None:
@@ -144,14 +144,22 @@ def test_pause_step_knock_and_recording(page: Page, browser: Browser) -> None:
     browser.until('document.querySelector("#log").innerText.includes("knock of 0.002 N s")', 'it')
     browser.enter('#impulse', '1e12')
     browser.click('#knock')
-    browser.until('document.querySelector("#notice").textContent.includes("impulse is")', 'no')
-    browser.click('[data-call=record_snapshot]')
+    browser.until(
+        'document.querySelector("#notice").textContent.includes("Nothing was hit")', 'no'
+    )
+    browser.enter('#impulse', '2')
+    browser.until('document.querySelector("#snapshot").disabled', 'that all is written')
+    log = 'document.querySelector("#log").innerText'
+    browser.click('[data-call=record_split]')
+    browser.until(f'{log}.includes("Going on in a new file.")', 'the new file')
+    browser.click('[data-call=record_stop]')
+    browser.until('document.querySelector("#recording").textContent.includes("not rec")', 'an end')
+    browser.until(f'/ holds \\d+ messages/.test({log})', 'what was recorded')
+    browser.click('#snapshot')
     browser.until(
         'document.querySelector("#notice").textContent.includes("Nothing is kept in memory")',
         'the refusal of the recorder',
     )
-    browser.click('[data-call=record_stop]')
-    browser.until('document.querySelector("#recording").textContent.includes("not rec")', 'an end')
     assert (page.folder / 'run' / 'metadata.yaml').exists()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -69,10 +70,16 @@ def test_the_supervisor_asks_in_the_page_and_is_answered_there(browser: Browser)
     browser.enter('#p-depth_of_cut', '1')
     browser.until(f'{LAMP} === "CHATTER"', 'the lamp', PATIENCE)
     asked = 'document.querySelector("#action").textContent'
-    browser.until(f'{asked}.includes("~/accept does it")', 'the question', PATIENCE)
+    browser.until(f'{asked}.includes("press Accept")', 'the question', PATIENCE)
+    question = browser.text('#question-text')
+    assert re.search(r'set spindle speed from 3000 to \d[\d.]* rev/min \(', question)
+    assert not re.search(r'_rpm|~/| um\b|1/s', question)
+    seen = browser.run('document.querySelector("#question").getBoundingClientRect().bottom')
+    assert 0 < seen <= browser.run('innerHeight')
     assert browser.run('cell.lathe_values.spindle_speed_rpm') == 3000.0
     browser.click('[data-call=accept]')
     browser.until('cell.lathe_values.spindle_speed_rpm !== 3000', 'the move', PATIENCE)
+    browser.until('document.querySelector("#question").hidden', 'no question any more')
     browser.until(f'{LAMP} === "stable"', 'the lamp out', PATIENCE)
     browser.until(f'{asked}.includes("has ended")', 'what came of it', PATIENCE)
     browser.run('document.querySelector("#mode").focus()')
@@ -91,6 +98,16 @@ def test_a_scenario_is_played_from_the_page_and_stopped(browser: Browser) -> Non
     browser.until('cell.lathe_values.depth_of_cut === 0.00062', 'its step', PATIENCE)
     browser.click('#play')
     browser.until(f'{said}.includes("is stopped")', 'its end')
+
+
+def test_a_scenario_that_needs_a_supervisor_is_refused_without(
+    page: Page, browser: Browser
+) -> None:
+    operate(browser)
+    page.kill('chatter_supervisor')
+    browser.until('!cell.alive.supervisor', 'its silence', PATIENCE)
+    answer = browser.run('ask({do: "play", scenario: "asked"})')
+    assert 'needs a chatter_supervisor, and none is here' in answer['text']
 
 
 def test_another_lathe_is_chosen_and_driven(browser: Browser) -> None:

@@ -15,15 +15,18 @@ function css(name) {
 }
 
 // A legend is no canvas: its marks take the colours of the style sheet, of whatever theme, by themselves.
-function legend(names) {
+function legend(names, dashes = [], filled = -1) {
   const mark = (u, k) => `var(--${names[k - 1]})`;
-  return {show: true, live: false, markers: {stroke: mark, fill: () => 'transparent'}};
+  const dash = (u, k) => (!dashes[k - 1]?.length ? 'solid' : dashes[k - 1][0] > 3 ? 'dashed' : 'dotted');
+  return {show: true, live: false, markers: {stroke: mark, dash, fill: (u, k) => (k - 1 === filled ? `${mark(u, k)} content-box` : 'transparent')}};
 }
 
 function axis(label, more) {
   return {
     label, stroke: () => css('ink'), grid: {stroke: () => css('grid'), width: 1},
     ticks: {stroke: () => css('grid'), width: 1}, labelSize: 22, size: more?.side ? 62 : 34,
+    // Of whatever size, at least two numbers: steps are at most twice as wide as this.
+    space: (u, side, low, high, size) => Math.min(more?.side ? 30 : 50, size / 4),
     font: '12px system-ui', labelFont: '12px system-ui', ...more,
   };
 }
@@ -90,7 +93,7 @@ function drawSignals(id, what, times, values, height, onSelect) {
     scales: {x: {time: false}, y: {range: room(factor * (what === 'displacement' ? 1e-8 : 1e-5))}},
     axes: [axis('simulated time / s'), axis(height < 150 ? unit : `${what} / ${unit.includes('/') ? `(${unit})` : unit}`, {side: 3})],
     cursor: {show: !!onSelect, drag: {x: true, y: false, setScale: false}},
-    hooks: onSelect ? {setSelect: [u => {
+    hooks: onSelect ? {draw: [u => u.mark?.(u)], setSelect: [u => {
       if (u.select.width > 4) {
         onSelect(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'));
         u.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
@@ -164,6 +167,15 @@ function drawPortrait(id, body, line, points) {
   describe(id, `Phase portrait of the ${body}: ${number(Math.min(...x))} to ${number(Math.max(...x))} µm, ${points.length / 2} turns`);
 }
 
+// What was drawn of a cut that has begun anew, and of which nothing has come yet.
+function wipePlots() {
+  for (const [id, u] of plots) {
+    if (id === 'chart') continue;
+    Object.assign(u, {hand: () => {}, turn: null, chatter: null});
+    u.setData(u.data.map(() => []));
+  }
+}
+
 function clip(u) {
   u.ctx.save();
   u.ctx.beginPath();
@@ -195,12 +207,14 @@ function upright(u, x, colour, label, dash = []) {
 }
 
 // Amplitudes on a logarithmic scale, the harmonics of the spindle dotted, chatter by a line.
-function drawSpectrum(amplitudes, step, speed, chatter) {
+function drawSpectrum(amplitudes, step, speed, chatter, about = chatter) {
   const x = Float64Array.from(amplitudes, (_, k) => k * step);
+  // To some times what is known to vibrate, in steps, so that it is still.
+  const all = x[x.length - 1], most = about ? Math.min(all, 500 * Math.ceil(about / 100)) : plots.get('spectrum')?.most ?? all;
   const y = Array.from(amplitudes, v => Math.max(v * MICRO, 1e-7));
   plot('spectrum', 'spectrum', () => ({
     height: 220, legend: {show: false},
-    scales: {x: {time: false}, y: {distr: 3, range: (u, low, high) => logarithmic(high)}},
+    scales: {x: {time: false, range: u => [0, u.most]}, y: {distr: 3, range: (u, low, high) => logarithmic(high)}},
     axes: [axis('frequency / Hz'), axis('amplitude / µm', {side: 3, values: (u, list) => list.map(v => (v && Number.isInteger(Math.log10(v)) ? v.toExponential(0) : ''))})],
     series: [{}, {stroke: () => css('tool'), width: 1, points: {show: false}}],
     hooks: {draw: [u => {
@@ -210,7 +224,7 @@ function drawSpectrum(amplitudes, step, speed, chatter) {
       if (u.chatter) upright(u, u.chatter, 'alarm', `${u.chatter.toFixed(1)} Hz`);
       u.ctx.restore();
     }]},
-  }), [x, y], {turn: speed / 60, chatter});
+  }), [x, y], {turn: speed / 60, chatter, most});
   let peak = 1;
   amplitudes.forEach((v, k) => { if (k && v > amplitudes[peak]) peak = k; });
   describe('spectrum', `Spectrum of the tool: largest ${number(amplitudes[peak] * MICRO)} µm at ${number(peak * step)} Hz${chatter ? `, chatter at ${number(chatter)} Hz` : ''}`);
@@ -220,7 +234,7 @@ const LIMITS = [
   ['depth_of_cut', 'every smaller depth is stable', 'safe', [], 'none seated gap both_sides'],
   ['open_limit', 'limit, open', 'tool', [], 'none gap both_sides'],
   ['seated_limit', 'limit, on its bearing', 'workpiece', [8, 4], 'seated gap both_sides'],
-  ['seating_line', 'seating line', 'ink', [2, 3], 'gap both_sides'],
+  ['seating_line', 'here the force closes the clearance', 'ink', [2, 3], 'gap both_sides'],
   ['stable_95%', 'stable with 95 %', 'safe', [6, 2], ''],
   ['stable_50%', '50 %', 'safe', [4, 4], ''],
   ['stable_5%', '5 %', 'safe', [2, 6], ''],
@@ -230,12 +244,13 @@ const LIMITS = [
 function drawChart(chart, point, trail, recommended, alarmed) {
   const shown = LIMITS.filter(([name, , , , contacts]) =>
     chart[name]?.some(v => v != null) && (!contacts || contacts.split(' ').includes(chart.contact)));
-  const top = Math.max(chart.top, (point?.depth ?? 0) * 1.25) * MILLI;
+  // With the pockets as far up as a slider goes, where the machine is not so soft that they are small then.
+  const top = Math.max(Math.min(1.5 * chart.top, 2e-3), chart.top, (point?.depth ?? 0) * 1.25) * MILLI;
   const same = plots.get('chart')?.made === chart && plots.get('chart').top === top;
   const data = same ? null : [chart.speed, ...shown.map(([name]) =>
     chart[name].map(v => (v == null ? 10 * top : Math.min(v * MILLI, 10 * top))))];
   plot('chart', chart, () => ({
-    height: 320, legend: legend(shown.map(([, , colour]) => colour)),
+    height: 320, legend: legend(shown.map(([, , colour]) => colour), shown.map(([, , , dash]) => dash), shown.findIndex(([name]) => name === 'depth_of_cut')),
     scales: {x: {time: false, range: () => [chart.speed[0], chart.speed[chart.speed.length - 1]]},
       y: {range: u => [0, u.top]}},
     axes: [axis('spindle speed / (rev/min)'), axis('depth of cut / mm', {side: 3})],

@@ -11,6 +11,11 @@ const SHOP = {
   force_noise: ['N/√Hz', 1, 1], cutting_force_noise: ['N/√Hz', 1, 1], acceleration_noise: ['m/s²', 1, 10],
   speed_variation_amplitude: ['%', 100, 50], speed_variation_frequency: ['Hz', 1, 10], unbalance: ['g mm', 1e6, 5000],
 };
+// What the table of parameters says in names.
+const HELP = {
+  feed_per_revolution: 'with it the feed follows the spindle; 0: the feed speed holds',
+  bearing_contact: 'none: no bearing; seated: always on it; gap: once the clearance is used up; both sides: on either side of it',
+};
 const PRIMARY = ['spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'bearing_contact', 'feed_speed', 'feed_per_revolution'];
 
 let socket = null, retries = 0, asked = 0, frames = 0;
@@ -22,6 +27,18 @@ function forget() {
   trail = [];
   signals = null;
   envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
+}
+
+const worded = name => name.replace(/_rpm$/, '').replaceAll('_', ' ');
+
+// A sentence of a node as an operator reads it: with his words, units and signs.
+function plainly(text) {
+  const changed = (all, name, from, to) => {
+    const [unit, factor] = SHOP[name] ?? [];
+    return factor ? `${worded(name)} from ${number(from * factor, 5)} to ${number(to * factor, 5)} ${unit}`.trim() : all;
+  };
+  return text.replace(/\b(\w+) from ([-\d.e]+) to ([-\d.e]+)/g, changed).replace('~/accept does it', 'press Accept')
+    .replace(/\bum\b/g, 'µm').replaceAll('+-', '±').replaceAll(' 1/s', ' /s');
 }
 
 // ---- connection ------------------------------------------------------------------------------
@@ -117,7 +134,10 @@ function takePage(news) {
   }
   if (recorded) takeRun(news);
   if ('other_pages' in news) takeServer({});
-  if (news.scenarios) $('scenario').replaceChildren(...news.scenarios.map(name => new Option(name)));
+  if (news.scenarios) {
+    $('scenario').replaceChildren(...Object.keys(news.scenarios).map(name => new Option(worded(name), name)));
+    describeScenario();
+  }
 }
 
 function choose() {
@@ -125,7 +145,8 @@ function choose() {
   // What the one before had, this one may not have, and then says nothing of.
   makeSupervisor(null);
   $('log').replaceChildren();
-  for (const id of ['action', 'scenario-text', 'recording', 'health', 'chart-text']) $(id).textContent = '';
+  showQuestion();
+  for (const id of ['scenario-text', 'recording', 'health', 'chart-text']) $(id).textContent = '';
   sessionStorage.setItem('lathe', $('lathes').value);
   act({do: 'choose', lathe: $('lathes').value});
 }
@@ -150,6 +171,7 @@ function lock() {
   const mine = server.operating && socket.readyState === WebSocket.OPEN;
   document.querySelectorAll('.act').forEach(each => { each.disabled = !mine; });
   recommended = stale() ? null : cell.figures?.recommended_speed_rpm;
+  $('snapshot').disabled ||= !!cell.statuses?.recorder?.recording?.values?.run;
   $('take-recommended').disabled = !mine || !recommended;
   $('take-recommended').textContent = recommended ? `Set ${Math.round(recommended)} rev/min` : 'No speed is recommended';
 }
@@ -159,11 +181,17 @@ function takeCell(news) {
   const shown = {
     lathe_rows: makeControls, lathe_values: showValues, supervisor_rows: makeSupervisor,
     supervisor_values: values => { if (document.activeElement !== $('mode')) $('mode').value = values.mode; },
-    action: text => { $('action').textContent = text; }, figures: () => { figuresDue = true; }, flag: showLamp, state: showLamp,
+    action: showQuestion, asked: showQuestion, figures: () => { figuresDue = true; }, flag: showLamp, state: showLamp,
     alive: showAlive, statuses: showAlive, log: showLog, chart: showChart, charting: showChart,
     scenario: showScenario,
   };
   for (const name of Object.keys(news)) shown[name]?.(news[name]);
+}
+
+function showQuestion() {
+  $('action').textContent = plainly(cell.action ?? '');
+  $('question-text').textContent = cell.asked ? `The supervisor asks. ${$('action').textContent}` : '';
+  $('question').hidden = !cell.asked;
 }
 
 function showGone(text) {
@@ -190,19 +218,22 @@ function showAlive() {
   if (!monitor) words.push('The monitor is silent: nothing is known of chatter.');
   if (!recorder) words.push('No recorder is there.');
   const heard = cell.statuses?.monitor?.samples;
-  for (const text of [cell.complaint, heard?.level > 1 ? heard.message : '']) if (text) words.push(text);
+  for (const text of [cell.complaint, heard?.level > 1 && run !== 'paused' ? heard.message : '']) if (text) words.push(text);
   showGone(words.join(' '));
   showLamp();
   showStatuses();
 }
 
 function showLamp() {
-  const {flag, state, alive} = cell, known = flag && !stale() && (recorded || alive?.monitor);
+  const {flag, state, alive} = cell, now = recorded ? Infinity : signals?.time;
+  const told = cell.statuses?.monitor?.cut?.values ?? {}, same = told.flag === (flag?.up ? 'True' : 'False');
+  const at = flag?.since ?? (same ? told['flag since, s'] : null);
+  // Not of a run before this one: nothing was cut in this, or the flag is of a time to come.
+  const other = signals && (now == null || (flag?.up && at > now + 0.5));
+  const known = flag && !other && !stale() && (recorded || alive?.monitor);
   $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
   const word = !known ? 'unknown' : flag.up ? 'CHATTER' : state ?? 'no chatter';
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
-  const told = cell.statuses?.monitor?.cut?.values ?? {}, same = told.flag === (flag?.up ? 'True' : 'False');
-  const at = flag?.since ?? (same ? told['flag since, s'] : null);
   const since = known && flag.up && at != null ? `since ${Number(at).toFixed(2)} s` : '';
   if ($('lamp-since').textContent !== since) $('lamp-since').textContent = since;
 }
@@ -229,14 +260,15 @@ function showStatuses() {
   const button = document.querySelector('[data-call=pause], [data-call=resume]');
   button.dataset.call = paused ? 'resume' : 'pause';
   button.textContent = paused ? 'Go on' : 'Pause';
+  if (!recorded) showClock();
   const lost = [
     [Number(monitor?.samples?.values?.['samples lost'] ?? 0), 'the monitor'],
     [Number(recorder?.recording?.values?.lost ?? 0), 'the recorder'], [signals?.lost ?? 0, 'this page'],
   ].filter(([count]) => count).map(([count, who]) => `${count} by ${who}`), old = stale();
   $('health').className = (pace?.level ?? 0) || lost.length ? 'bad' : '';
   $('health').textContent = old ? `${old}${lost.length ? ` Lost: ${lost.join(', ')}.` : ''}` : pace ? `${pace.message}: ${number(Number(v['real-time factor']))} × real time, late by ${number(Number(v['lateness p99, us']) / 1e3)} ms (p99), ${number(Number(v['lag given up, s']))} s given up. Lost: ${lost.join(', ') || 'nothing'}.` : '';
-  const recording = recorder?.recording;
-  $('recording').textContent = recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
+  const recording = recorder?.recording, answers = socket.readyState === WebSocket.OPEN;
+  $('recording').textContent = !answers ? 'Not known while the server of this page does not answer.' : cell.alive?.recorder === false ? 'No recorder is there.' : recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
   showFigures();
 }
 
@@ -246,15 +278,20 @@ function showLog() {
     who.className = 'who';
     who.textContent = `${entry.node.split('/').pop()}: `;
     item.className = entry.level >= 40 ? 'error' : entry.level >= 30 ? 'warn' : '';
-    item.append(who, entry.text);
+    item.append(who, plainly(entry.text));
     return item;
   });
   $('log').replaceChildren(...items);
 }
 
-function showScenario({playing, text}) {
+function showScenario({playing, text, before}) {
   $('scenario-text').textContent = text;
   $('play').textContent = playing ? 'Stop' : 'Play';
+  $('back').hidden = playing || !before;
+}
+
+function describeScenario() {
+  if (!cell.scenario?.playing) $('scenario-text').textContent = page.scenarios[$('scenario').value];
 }
 
 function takeSignals(news, arrays) {
@@ -262,6 +299,9 @@ function takeSignals(news, arrays) {
     envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
     trail = [];
     document.querySelectorAll('.refusal').forEach(each => { each.textContent = ''; });
+    signals = news;
+    showLamp();
+    if (news.time == null) wipePlots();
   }
   signals = news;
   news.spans.forEach(([first, count, step], k) => {
@@ -284,10 +324,15 @@ function takeSignals(news, arrays) {
     if (old > 0) for (const list of [e.times, ...e.values]) list.splice(0, old);
     if (count && (k === 0 || frames % 10 === 0)) drawEnvelope(k);
   });
-  if (frames % 4 === 0) $('clock').textContent = `${news.time.toFixed(1)} s`;
+  if (frames % 4 === 0 || news.time == null) showClock();
 }
 
-function drawEnvelope(k, height = k ? 110 : 170, onSelect = null) {
+function showClock() {
+  const pause = cell.statuses?.lathe?.pace?.message === 'paused' && !stale() ? ', paused' : '';
+  if (signals) $('clock').textContent = `${(signals.time ?? 0).toFixed(1)} s${pause}`;
+}
+
+function drawEnvelope(k, height = k ? 130 : 170, onSelect = null) {
   const {times, values} = envelopes[k];
   drawSignals(`displacement-${k}`, 'displacement', times, [values[0], values[2]], height, onSelect);
   drawSignals(`velocity-${k}`, 'velocity', times, [values[1], values[3]], height, onSelect);
@@ -298,7 +343,7 @@ function takeCloseup(figures, arrays) {
   for (const body of ['tool', 'workpiece']) {
     if (arrays[`${body}_portrait`]) drawPortrait(`${body}-portrait`, body, arrays[`${body}_portrait`], arrays[`${body}_turns`] ?? []);
   }
-  if (arrays.spectrum) drawSpectrum(arrays.spectrum, figures.hertz, figures.speed, chatter);
+  if (arrays.spectrum) drawSpectrum(arrays.spectrum, figures.hertz, figures.speed, chatter, cell.figures?.frequency);
   const depth = figures.depth ?? cell.lathe_values?.depth_of_cut;
   const speed = figures.speed ?? cell.lathe_values?.spindle_speed_rpm;
   if (depth == null) return;
@@ -333,6 +378,14 @@ function showChart() {
 
 // ---- what is done ----------------------------------------------------------------------------
 
+// A number as people type it, with a point or a comma; what may be none is refused in words.
+function typed(text) {
+  const given = text.trim(), plain = given.replace(',', '.'), value = Number(plain);
+  if (/^[-+]?[1-9]\d{0,2},\d{3}$/.test(given)) return {why: `${given} may be ${given.replace(',', '')} or ${plain}: write one of them. Nothing was changed.`};
+  if (given && /^[-+.\de]+$/i.test(plain) && isFinite(value)) return {value};
+  return {why: `${given ? `"${given.slice(0, 20)}" is not a number` : 'The field was empty'}: nothing was changed.`};
+}
+
 function shop(row) {
   const {name, unit, high} = row;
   if (SHOP[name]) return SHOP[name];
@@ -366,40 +419,47 @@ function makeControl(row) {
   place.className = 'control';
   const label = document.createElement('label'), line = document.createElement('div');
   label.htmlFor = id;
-  label.textContent = row.name.replace(/_rpm$/, '').replaceAll('_', ' ') + (unit ? ` / ${/[/ ]/.test(unit) ? `(${unit})` : unit}` : '');
+  label.textContent = worded(row.name) + (unit ? ` / ${/[/ ]/.test(unit) ? `(${unit})` : unit}` : '');
   line.className = 'row';
   const help = document.createElement('small'), refusal = document.createElement('span');
   help.id = `${id}-help`;
-  help.textContent = row.meaning;
+  const meaning = HELP[row.name] ?? row.meaning;
+  help.textContent = meaning.replace(/ \w+$/, '') === worded(row.name) || meaning === worded(row.name) ? '' : meaning;
   refusal.className = 'refusal';
   refusal.setAttribute('role', 'alert');
   const listed = row.choices.length || row.type === 1;
   const field = document.createElement(listed ? 'select' : 'input');
-  if (listed) field.append(...(row.choices.length ? row.choices : ['true', 'false']).map(v => new Option(v)));
-  else Object.assign(field, {type: 'number', step: 'any', inputMode: 'decimal'});
+  if (listed) field.append(...(row.choices.length ? row.choices : ['true', 'false']).map(v => new Option(worded(v), v)));
+  else field.inputMode = 'decimal';
   field.id = id;
   field.setAttribute('aria-describedby', help.id);
   const parts = [field];
   let slider = null;
   if (!listed) {
-    slider = Object.assign(document.createElement('input'), {type: 'range', min: row.low * factor, max: end, step: end / 1000});
+    // Steps of round numbers, from a multiple of them on: so a key reaches 3000.
+    const ten = 10 ** Math.floor(Math.log10(end / 1000)), step = Number((ten * [5, 2, 1].find(n => n * ten <= end / 999)).toPrecision(1));
+    slider = Object.assign(document.createElement('input'), {type: 'range', min: Math.ceil(row.low * factor / step) * step, max: end, step});
     slider.setAttribute('aria-label', `${label.textContent}, slider`);
     parts.unshift(slider);
   }
   parts.forEach(each => each.classList.add('act'));
   line.append(...parts);
   place.append(label, line, help, refusal);
-  const control = {show, busy: false, next: null};
+  const control = {show, busy: false, next: null, typing: false};
   controls.set(row.name, control);
 
   function show(value, force) {
     const shown = typeof value === 'number' ? Number((value * factor).toPrecision(9)) : String(value);
     if (!force && (control.busy || control.next != null)) return;
-    if (force || document.activeElement !== field || listed) field.value = shown;
+    if (force || !control.typing) field.value = shown;
     if (slider) {
       slider.max = shown > end ? shown * 1.5 : end;
-      slider.value = shown;
+      slide(shown);
     }
+  }
+  function slide(to) {
+    slider.value = to;
+    slider.setAttribute('aria-valuetext', `${to} ${unit}`);
   }
   // One request at a time, and then the newest: a slider that is drawn floods nobody.
   async function send(value) {
@@ -413,20 +473,27 @@ function makeControl(row) {
       answer = await ask({do: 'set', node: 'lathe', values: {[row.name]: last}});
     }
     control.busy = false;
-    const outside = unit !== row.unit && (last < row.low || last > row.high);
-    const here = outside ? ` That is ${number(row.low * factor)} to ${number(row.high * factor)} ${unit}.` : '';
-    refusal.textContent = answer.ok ? '' : answer.text + here;
+    const outside = last < row.low || last > row.high, onShop = n => number(n * factor, 9);
+    const allowed = row.allowed.slice(0, row.allowed.length - row.unit.length).replace(/-?\d[\d.]*(e[-+]?\d+)?/g, onShop);
+    const here = `${onShop(last)} ${unit}: it ${allowed.trim()} ${unit}`.trim() + '. Nothing was changed.';
+    refusal.textContent = answer.ok ? '' : outside ? here : answer.text;
     if (!answer.ok && cell.lathe_values) show(cell.lathe_values[row.name], true);
   }
-  const wanted = text => (row.type === 1 ? text === 'true' : listed ? text : Number(text) / factor);
   field.addEventListener('change', () => {
-    if (!listed && field.value.trim() === '') return show(cell.lathe_values[row.name], true);
-    if (slider) slider.value = field.value;
-    send(wanted(field.value));
+    if (listed) return send(row.type === 1 ? field.value === 'true' : field.value);
+    const {value, why} = typed(field.value);
+    control.typing = false;
+    refusal.textContent = why ?? '';
+    if (why) return show(cell.lathe_values[row.name], true);
+    slide(field.value = value);
+    send(value / factor);
   });
-  slider?.addEventListener('input', () => {
+  if (listed) return place;
+  field.addEventListener('input', () => { control.typing = true; });
+  slider.addEventListener('input', () => {
     field.value = Number(Number(slider.value).toPrecision(6));
-    send(wanted(slider.value));
+    slide(field.value);
+    send(field.value / factor);
   });
   return place;
 }
@@ -454,8 +521,14 @@ document.addEventListener('click', event => {
 });
 $('operate').onclick = () => act(server.operating ? {do: 'release'} : {do: 'operate', take_over: !!server.operator});
 $('take-recommended').onclick = () => act({do: 'set', node: 'lathe', values: {spindle_speed_rpm: Math.round(recommended)}});
-$('knock').onclick = () => $('impulse').value.trim() === '' ? notify({ok: false, text: 'Give the knock a size, in mN s.'}) : act({do: 'knock', impulse: Number($('impulse').value) / 1e3});
+$('knock').onclick = () => {
+  const {value, why} = typed($('impulse').value);
+  const far = Math.abs(value) > 1000 ? `${number(value, 9)} mN s would end the cut: from here -1000 to 1000 mN s are allowed. Nothing was hit.` : why;
+  if (far) notify({ok: false, text: `Knock: ${far.replace('changed', 'hit')}`});
+  else act({do: 'knock', impulse: value / 1e3});
+};
 $('play').onclick = () => act(cell.scenario?.playing ? {do: 'stop_playing'} : {do: 'play', scenario: $('scenario').value});
+$('scenario').onchange = describeScenario;
 $('lathes').onchange = choose;
 $('mode').onchange = () => act({do: 'set', node: 'supervisor', values: {mode: $('mode').value}}).then(answer => {
   if (!answer.ok) $('mode').value = cell.supervisor_values.mode;

@@ -9,7 +9,6 @@ function takeRun(news) {
     const {name, begin, end, state, version} = news.run;
     $('run-name').textContent = `Recorded run ${name}`;
     Object.assign($('at'), {min: begin, max: end});
-    $('at').setAttribute('aria-valuetext', `${run.at.toFixed(2)} s`);
     if (!run.begun) {
       $('span').replaceChildren(...SPANS.filter(s => s < end - begin).map(s => new Option(`${s} s`, s)), new Option('all', end - begin));
       run.span = Number($('span').value = String(SPANS.filter(s => s <= 2 && s < end - begin).pop() ?? end - begin));
@@ -46,6 +45,8 @@ async function look(at, span = run.span) {
   Object.assign(run, {at, span});
   trail = run.path.filter(([time], k) => k === 0 || time <= at).map(([, speed, depth]) => ({speed, depth}));
   $('at').value = at;
+  $('at').setAttribute('aria-valuetext', `${at.toFixed(2)} s`);
+  plots.get('overview')?.redraw(false);
   $('at-text').value = `${at.toFixed(span < 0.2 ? 4 : 2)} s`;
   run.again = true;
   if (run.busy) return;
@@ -69,10 +70,25 @@ function takeView({from, to, plot}, {times, values}) {
     x.push(from + t, from + (t + next) / 2);
   });
   const select = (begin, end) => look(end, end - begin);
-  if (plot === 'overview') return drawSignals('overview', 'displacement', x, [column(0), column(2)], 130, select);
+  if (plot === 'overview') {
+    drawSignals('overview', 'displacement', x, [column(0), column(2)], 130, select);
+    Object.assign(plots.get('overview') ?? {}, {mark: markMoment}).redraw?.(false);
+    return;
+  }
   drawSignals('displacement-0', 'displacement', x, [column(0), column(2)], 220, select);
   drawSignals('velocity-0', 'velocity', x, [column(1), column(3)], 220, select);
   $('clock').textContent = `${to.toFixed(3)} s`;
+}
+
+// The moment in the overview; and its slider, as wide as the axis above it.
+function markMoment(u) {
+  clip(u);
+  u.ctx.lineWidth = 2 * devicePixelRatio;
+  upright(u, run.at, 'ink', '');
+  u.ctx.restore();
+  const {left, width} = u.bbox, half = 8;
+  $('at').style.marginLeft = `${left / devicePixelRatio - half}px`;
+  $('at').style.width = `${width / devicePixelRatio + 2 * half}px`;
 }
 
 $('at').oninput = () => look(Number($('at').value));

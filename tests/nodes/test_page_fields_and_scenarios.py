@@ -1,0 +1,164 @@
+"""What is typed into the page, and what it says of cuts that others begin, in a real browser."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from support.browser import Browser, chromium
+from support.page_cell import LAMP, PATIENCE, Page, looking_at, operate
+
+if chromium() is None:
+    pytest.skip('no Chromium is here', allow_module_level=True)
+
+REFUSAL = 'document.querySelector(".refusal:not(:empty)")?.textContent'
+CLOCK = 'document.querySelector("#clock").textContent'
+
+
+@pytest.fixture(scope='module')
+def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]:  # noqa: ARG001
+    page = Page(tmp_path_factory.mktemp('cell'))
+    page.start('operator_page', 'port:=0')
+    page.start('run_recorder', f'output:={page.folder / "run"}')
+    page.start('chatter_monitor')
+    page.start('lathe', 'force_noise:=0.001')
+    yield page
+    page.nodes.end()
+    sys.stdout.write(page.nodes.said())
+
+
+@pytest.fixture(scope='module')
+def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
+    with looking_at(page.url(), tmp_path_factory.mktemp('profile')) as browser:
+        yield browser
+
+
+@pytest.mark.parametrize('text', ['0,4', '0.4', ' .4 '])
+def test_a_decimal_comma_is_one(browser: Browser, text: str) -> None:
+    operate(browser)
+    browser.run('ask({do: "set", node: "lathe", values: {depth_of_cut: 0.0005}})')
+    browser.until('cell.lathe_values.depth_of_cut === 0.0005', 'the cut before')
+    browser.enter('#p-depth_of_cut', text)
+    browser.until('cell.lathe_values.depth_of_cut !== 0.0005', 'the change')
+    assert browser.run('cell.lathe_values.depth_of_cut') == 0.0004
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('abc', '"abc" is not a number: nothing was changed.'),
+        ('0.4.1', '"0.4.1" is not a number: nothing was changed.'),
+        ('', 'The field was empty: nothing was changed.'),
+        ('1,500', '1,500 may be 1500 or 1.500: write one of them. Nothing was changed.'),
+    ],
+)
+def test_what_is_no_number_changes_nothing_and_is_said(
+    browser: Browser, text: str, said: str
+) -> None:
+    operate(browser)
+    before = browser.run('cell.lathe_values.depth_of_cut')
+    browser.enter('#p-depth_of_cut', text or ' ')
+    assert browser.until(REFUSAL, 'the refusal') == said
+    assert float(browser.run('document.querySelector("#p-depth_of_cut").value')) == before * 1e3
+    assert browser.run('cell.lathe_values.depth_of_cut') == before
+
+
+def test_a_knock_of_one_and_a_half(browser: Browser) -> None:
+    operate(browser)
+    browser.enter('#impulse', '1,5')
+    browser.click('#knock')
+    said = 'document.querySelector("#log").innerText'
+    browser.until(f'{said}.includes("knock of 0.0015 N s")', 'the knock')
+
+
+def test_keys_reach_round_speeds_which_are_told_with_their_unit(browser: Browser) -> None:
+    operate(browser)
+    browser.enter('#p-spindle_speed_rpm', '2990')
+    browser.until('cell.lathe_values.spindle_speed_rpm === 2990', 'a speed')
+    slider = 'document.querySelector("[aria-label^=\\"spindle speed\\"]")'
+    browser.run(f'{slider}.focus()')
+    browser.key('ArrowRight', 39)
+    browser.until('cell.lathe_values.spindle_speed_rpm === 3000', 'the next')
+    assert browser.run(f'{slider}.getAttribute("aria-valuetext")') == '3000 rev/min'
+
+
+@pytest.mark.parametrize('width', [390, 1280])
+def test_each_axis_has_two_numbers(browser: Browser, width: int) -> None:
+    browser.resize(width)
+    try:
+        browser.until('plots.get("chart") && plots.get("spectrum")', 'the plots', PATIENCE)
+        poor = (
+            '[...plots].flatMap(([id, u]) => u.axes.map((a, k) => [id, k, a._values])).filter('
+            '([, , values]) => !(values?.filter(v => v != null && v !== "").length > 1))'
+        )
+        browser.until(f'!{poor}.length', 'two numbers on each')
+    finally:
+        browser.resize(1280)
+
+
+def test_what_was_set_before_a_scenario_can_be_had_back(browser: Browser) -> None:
+    operate(browser)
+    browser.run('document.querySelector("#scenario").value = "no_clearance"')
+    browser.run('document.querySelector("#scenario").onchange()')
+    said = 'document.querySelector("#scenario-text").textContent'
+    assert 'the lathe begins anew, with its cut' in browser.run(said)
+    depth = browser.run('cell.lathe_values.depth_of_cut')
+    browser.click('#play')
+    browser.until('cell.lathe_values.force_noise === 0', 'the cut of the scenario', PATIENCE)
+    browser.until(f'{said}.includes("; next, at 3 s: ")', 'what it waits for')
+    browser.click('[data-call=reset]')
+    browser.until(f'{said}.includes("is stopped by the reset")', 'its end')
+    assert browser.run('cell.lathe_values.force_noise') == 0
+    browser.click('#back')
+    browser.until('cell.lathe_values.force_noise === 0.001', 'the noise of before')
+    assert browser.run('cell.lathe_values.depth_of_cut') == depth
+    browser.until('document.querySelector("#back").hidden', 'that there is no other')
+
+
+def test_a_reset_while_paused_leaves_nothing_of_the_cut_before(browser: Browser) -> None:
+    operate(browser)
+    browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
+    browser.click('[data-call=pause]')
+    browser.until(f'{CLOCK}.includes("paused")', 'the pause')
+    assert browser.run('document.querySelector("#gone").hidden')
+    browser.click('[data-call=reset]')
+    browser.until(f'{CLOCK} === "0.0 s, paused"', 'the new time')
+    browser.until('document.querySelector("#growth_rate").textContent === "\\u2013"', 'none')
+    assert browser.run('plots.get("displacement-0").data[0].length') == 0
+    assert browser.run(LAMP) == 'unknown'
+    browser.click('[data-call=resume]')
+    browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
+    assert browser.complaints == []
+
+
+def test_a_flag_of_a_run_before_lights_no_lamp(browser: Browser) -> None:
+    told = '{flag: "True", "flag since, s": "1e6"}'
+    lamp = browser.run(
+        f'(() => {{ const flag = cell.flag; cell.flag = {{up: true}};'
+        f' cell.statuses.monitor.cut.values = {told}; showLamp();'
+        f' const seen = {LAMP}; cell.flag = flag; showLamp(); return seen; }})()'
+    )
+    assert lamp == 'unknown'
+
+
+def test_a_killed_recorder_records_nothing(page: Page, browser: Browser) -> None:
+    said = 'document.querySelector("#recording").textContent'
+    browser.until(f'{said}.startsWith("recording")', 'the recording', PATIENCE)
+    page.kill('run_recorder')
+    browser.until(f'{said} === "No recorder is there."', 'that it is gone', PATIENCE)
+
+
+def test_a_field_that_has_the_focus_follows_a_lathe_that_begins_anew(
+    page: Page, browser: Browser
+) -> None:
+    operate(browser)
+    browser.enter('#p-depth_of_cut', '0.3')
+    browser.until('cell.lathe_values.depth_of_cut === 0.0003', 'the change')
+    page.kill('lathe')
+    browser.until('document.querySelector("#gone").textContent.includes("silent")', 'its end')
+    page.start('lathe', 'force_noise:=0.001')
+    browser.until('cell.lathe_values.depth_of_cut === 0.0005', 'its parameters', PATIENCE)
+    assert browser.run('document.activeElement.id') == 'p-depth_of_cut'
+    assert browser.run('document.activeElement.value') == '0.5'
