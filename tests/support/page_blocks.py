@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import shlex
@@ -9,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from importlib.metadata import distributions, requires
 from pathlib import Path
@@ -61,7 +63,7 @@ def pages() -> list[Path]:
 
 
 def blocks(page: Path) -> list[Block]:
-    """The blocks of a page that could be run: shell, Python, files, and MATLAB, which cannot."""
+    """The blocks of a page: shell, Python, what it prints, files; MATLAB, which cannot be run."""
     text = page.read_text(encoding='utf-8')
     return [
         Block(
@@ -71,7 +73,8 @@ def blocks(page: Path) -> list[Block]:
             text[: found.start()].count('\n') + 1,
         )
         for found in _BLOCK.finditer(text)
-        if found['kind'] in {'sh', 'python', 'matlab'} or (found['mark'] or '').startswith(_FILE)
+        if found['kind'] in {'sh', 'python', 'matlab'}
+        or (found['mark'] or '').startswith((_FILE, 'printed'))
     ]
 
 
@@ -92,6 +95,7 @@ class Reader:
         """Nothing typed yet."""
         self.folder = folder
         self._names: dict[str, Any] = {'__name__': '__main__'}
+        self._printed = ''
         self._nodes: list[subprocess.Popen[bytes]] = []
 
     def run(self, block: Block) -> None:
@@ -104,8 +108,13 @@ class Reader:
         if block.kind == 'python' and block.talks_to_ros:
             self._check([sys.executable, '-c', block.text], block.text)
             return
+        if block.mark == 'printed':
+            assert block.text == self._printed
+            return
         if block.kind == 'python':
-            exec(compile(block.text, '<page>', 'exec'), self._names)  # noqa: S102 -- our own pages
+            with redirect_stdout(io.StringIO()) as said:
+                exec(compile(block.text, '<page>', 'exec'), self._names)  # noqa: S102 -- our own
+            self._printed = said.getvalue()
             return
         commands = re.sub(r'\\\n\s*', '', block.text).splitlines()
         for command in (line for line in commands if line.strip() and not line.startswith('#')):
