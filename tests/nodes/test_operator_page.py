@@ -321,6 +321,9 @@ def test_legends_follow_the_theme(browser: Browser) -> None:
             seen.append(found)
     finally:
         browser.resize(1280)
+    styles = browser.run(f'[...{marks}].map(e => getComputedStyle(e).borderTopStyle)')
+    assert {'solid', 'dashed', 'dotted'} <= {*styles}
+    assert browser.run('plots.get("spectrum").scales.x.max') == 1000  # of 130 Hz, not 2000
     assert len(seen[0]) == len(seen[1])
     assert all(light != dark for light, dark in zip(*seen, strict=True))
 

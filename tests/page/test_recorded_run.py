@@ -183,6 +183,13 @@ def test_a_browser_scrubs_through_the_run(served: str, tmp_path: Path, width: in
         browser.until('document.querySelector("#chart-text").textContent.includes("0.62")', 'it')
         for plot in ('displacement-0', 'velocity-0', 'tool-portrait', 'spectrum', 'chart'):
             browser.until(f'document.querySelector("#{plot} canvas")', plot)
+        # The whole run is drawn, and its slider ends where its axis does.
+        assert browser.run('plots.get("overview").scales.x.max') == pytest.approx(12.0, abs=0.1)
+        ends = browser.run(
+            '(u => [u.over, document.querySelector("#at")].flatMap(e => '
+            '(r => [r.left, r.right])(e.getBoundingClientRect())))(plots.get("overview"))'
+        )
+        assert ends[2:] == pytest.approx(ends[:2], abs=9.0)  # half of its knob further
         begun = time.monotonic()
         browser.click('#log button')  # the change of depth
         browser.until('document.querySelector("#clock").textContent === "3.000 s"', 'that moment')
