@@ -65,6 +65,17 @@ def test_what_is_no_number_changes_nothing_and_is_said(
     assert browser.run('cell.lathe_values.depth_of_cut') == before
 
 
+def test_an_answer_that_comes_late_wipes_no_later_refusal(browser: Browser) -> None:
+    operate(browser)
+    browser.run(
+        '(field => { for (const text of ["0.45", "abc"]) {'
+        ' field.value = text; field.dispatchEvent(new Event("change")); } })'
+        '(document.querySelector("#p-depth_of_cut"))'
+    )
+    browser.until('!controls.get("depth_of_cut").busy', 'the answer')
+    assert browser.run(REFUSAL) == '"abc" is not a number: nothing was changed.'
+
+
 def test_a_knock_of_one_and_a_half(browser: Browser) -> None:
     operate(browser)
     browser.enter('#impulse', '1,5')

@@ -464,6 +464,7 @@ function makeControl(row) {
   // One request at a time, and then the newest: a slider that is drawn floods nobody.
   async function send(value) {
     control.next = value;
+    refusal.textContent = '';
     if (control.busy) return;
     control.busy = true;
     let answer = {ok: true, text: ''}, last;
@@ -476,8 +477,9 @@ function makeControl(row) {
     const outside = last < row.low || last > row.high, onShop = n => number(n * factor, 9);
     const allowed = row.allowed.slice(0, row.allowed.length - row.unit.length).replace(/-?\d[\d.]*(e[-+]?\d+)?/g, onShop);
     const here = `${onShop(last)} ${unit}: it ${allowed.trim()} ${unit}`.trim() + '. Nothing was changed.';
-    refusal.textContent = answer.ok ? '' : outside ? here : answer.text;
-    if (!answer.ok && cell.lathe_values) show(cell.lathe_values[row.name], true);
+    if (answer.ok) return;  // of what was typed since, there may be a refusal
+    refusal.textContent = outside ? here : answer.text;
+    if (cell.lathe_values) show(cell.lathe_values[row.name], true);
   }
   field.addEventListener('change', () => {
     if (listed) return send(row.type === 1 ? field.value === 'true' : field.value);
