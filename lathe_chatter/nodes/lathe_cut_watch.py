@@ -47,7 +47,7 @@ class LatheCutWatch:
         self._parameters.want_again('lathe')
 
     def _look(self) -> None:
-        self._parameters.ask('lathe', [_DEPTH])
+        self._parameters.ask('lathe')
         self._parameters.look()
 
     def _take(self, _name: str, values: dict[str, Any]) -> None:

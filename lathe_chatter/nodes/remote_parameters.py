@@ -32,15 +32,16 @@ _PATIENCE = 1.0
 _LONGEST_WAIT = 30.0
 """s for which an answer is awaited where something depends on it."""
 CONTACT = 'bearing_contact'
-_MACHINE = [MACHINE_FILE.name, CONTACT, *(row.name for row in MACHINE_ROWS)]
 
 OnMachine = Callable[[Machine, MachineDescription | None], None]
 Answer = Callable[[str, dict[str, Any]], None]
-"""Takes the name of a node and its parameters; one that it does not have is None."""
+"""Takes the name of a node and its parameters."""
 
 
 class RemoteParameters:
-    """Asks each wanted node, once it can answer.
+    """Asks each wanted node for all its parameters, once it can answer.
+
+    For all, as a node that lacks one of those it is asked for answers with none at all.
 
     Args:
         node: In whose name.
@@ -56,20 +57,19 @@ class RemoteParameters:
         self._answered: set[str] = set()
 
     def want(self, namespace: str, node_name: str) -> None:
-        """Ask a node for all its parameters, once the graph knows its name; but only once."""
+        """Ask a node, once the graph knows its name; but only once."""
         name = f'{namespace.rstrip("/")}/{node_name}'  # a namespace is / or ends without one
         if _UNKNOWN not in node_name and name != self._node.get_fully_qualified_name():
             self.ask(name)
 
-    def ask(self, name: str, parameters: Sequence[str] | None = None) -> None:
-        """Ask a node for some parameters, or for all, unless it is asked or has answered.
+    def ask(self, name: str) -> None:
+        """Ask a node, unless it is asked or has answered.
 
         Args:
             name: Full, or relative to the namespace of this node and remappable.
-            parameters: Their names; None for all that it has.
         """
         if name not in self._questions and name not in self._answered:
-            self._questions[name] = _Question(self._node, name, parameters)
+            self._questions[name] = _Question(self._node, name)
 
     def want_again(self, name: str) -> None:
         """Ask a node that has answered once more: another of its name has been started."""
@@ -93,9 +93,8 @@ class RemoteParameters:
 class _Question:
     """What one node is asked."""
 
-    def __init__(self, node: Node, name: str, parameters: Sequence[str] | None) -> None:
+    def __init__(self, node: Node, name: str) -> None:
         self._node = node
-        self._names = parameters
         self._get = node.create_client(GetParameters, f'{name}/get_parameters')
         self._list = node.create_client(ListParameters, f'{name}/list_parameters')
         self._due: float | None = None
@@ -128,9 +127,6 @@ class _Question:
             self._open.append(future)
             future.add_done_callback(got)
 
-        if self._names is not None:
-            get(self._names)
-            return
         listed = self._list.call_async(ListParameters.Request())
         self._open.append(listed)
         listed.add_done_callback(lambda future: get(list(future.result().result.names)))
@@ -183,16 +179,15 @@ class RemoteMachine:
         """Ask, if there is somebody to ask; called again and again until it is answered."""
         self.answered = False
         self._parameters.want_again('lathe')
-        self._parameters.ask('lathe', _MACHINE)
+        self._parameters.ask('lathe')
         self._parameters.look()
 
     def _take(self, _name: str, values: dict[str, Any]) -> None:
         self._awaited_since = -math.inf  # whatever it says
-        known = {name: value for name, value in values.items() if value is not None}
-        described = bool(known.get(MACHINE_FILE.name))
-        lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in known]
+        described = bool(values.get(MACHINE_FILE.name))
+        lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in values]
         try:
-            machine, file = machine_in_cut(known), described_by(known)
+            machine, file = machine_in_cut(values), described_by(values)
         except LatheChatterError as error:
             self._complain(str(error))
         else:

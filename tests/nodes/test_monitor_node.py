@@ -17,6 +17,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut
+from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.parameter_tables import RECORDED_TOPICS
@@ -308,6 +309,18 @@ def test_the_machine_is_asked_from_the_lathe(start: Callable[..., Any], bench: B
     monitor = start(MonitorNode, model='lathe')
     bench.spin_until(lambda: monitor.machine is not None, 'the answer of the lathe')
     assert monitor.machine.workpiece.mass == other
+
+
+@pytest.mark.parametrize('file', sorted(shipped_machines()))
+def test_the_machine_of_a_file_is_asked_from_the_lathe(
+    file: str, start: Callable[..., Any], bench: Bench
+) -> None:
+    """Also where it has several modes, so that the lathe lacks the parameters of single ones."""
+    start(LatheNode, machine=file)
+    monitor = start(MonitorNode, model='lathe')
+    bench.spin_until(lambda: monitor.machine is not None, 'the answer of the lathe')
+    told, meant = monitor.machine, load_machine(file).machine
+    assert (told.tool, told.workpiece) == (meant.tool, meant.workpiece)
 
 
 def test_a_bearing_is_assumed_only_while_the_lathe_has_one(
