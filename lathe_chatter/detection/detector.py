@@ -158,8 +158,13 @@ class ChatterDetector:
         """
         for adviser in self._advisers:
             adviser.follow_depth(factor)
-        if (request := self._estimate.request) is not None:
-            self._estimate = replace(self._estimate, request=request.at_depth(factor))
+        self._take_request()
+
+    def _take_request(self) -> None:
+        """What is recommended now, where something was."""
+        if self._estimate.request is not None:
+            request = self._advisers[self._speaker].request
+            self._estimate = replace(self._estimate, request=request)
 
     def set_machine(
         self,
@@ -173,8 +178,7 @@ class ChatterDetector:
             self._speed_range = speed_range
             for adviser in self._advisers:
                 adviser.keep_to(speed_range)
-            if (request := self._estimate.request) is not None:
-                self._estimate = replace(self._estimate, request=request.within(speed_range))
+            self._take_request()
         self._told = machine
         self._machine, self._lone, self._without = identifiable(machine)
         self._correction: tuple[float, float] | None = None

@@ -245,7 +245,7 @@ class BandDetector:
                 self._weigh_machine()
                 self.margin = self._new_margin()
             if not now['alarmed']:
-                self.adviser.forget()
+                self.adviser.end()
             elif self.adviser.is_due(since := int(now['since_alarm'])):
                 self.adviser.consider(self._identified(), since, modelled=self.believed)
         self._rest = block[count * self.hop :]

@@ -7,10 +7,16 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantity_fields import limits_of
-from lathe_chatter.stability import recommend_speeds, rightmost_root, rightmost_roots
+from lathe_chatter.stability import (
+    critical_depths,
+    recommend_speeds,
+    rightmost_roots,
+)
 
 _CANDIDATES = 8
 _DAMPED = 0.01
@@ -32,6 +38,8 @@ _AROUND, _TRIED = 0.15, 61
 """Part of a speed by which others around it are tried, and how many are."""
 _WIDE, _AS_GOOD = 0.04, 0.8
 """Width that an ordinary spindle can keep to; part of the damping that the middle must have."""
+_LOOKS, _LOOKED_AT = 3, 200
+"""Times that the speed of the deepest cut is looked for, ever closer, and speeds of each."""
 _KEPT = 0.7
 """Part of the damping, and of the width, of the best speed with which the one that was said before
 is kept to."""
@@ -191,14 +199,24 @@ def advise(  # noqa: PLR0913 -- what is known of a cut
             first = damped[0]
             found.remove(first)
             found.insert(0, first)
-        speeds = [speed for _, speed in found[:_MOST]]
+        speeds = [speed for _, speed in found]
         near_ones = [speed for _, speed in damped[:_MOST]] or speeds[:1]
         best = _wide_enough(cut, near_ones, speed_range)
-        speeds[0] = _kept(cut, advised_rpm, best, speed_range)
-        return Advice(tuple(speeds), 1.0, current_rpm)
+        best = _kept(cut, advised_rpm, best, speed_range)
+        return Advice(_apart([best, *speeds])[:_MOST], 1.0, current_rpm)
     contacts = both if seated is None else (seated,)
     cut = _KnownCut(machine, depth, contacts)
     return _less_depth(cut, speed_range, cutting_error / cutting_stiffness)
+
+
+def _apart(speeds: list[AdvisedSpeed]) -> tuple[AdvisedSpeed, ...]:
+    """Those that are not nearly the same as one before."""
+    kept: list[AdvisedSpeed] = []
+    for speed in speeds:
+        rpm = speed.spindle_speed_rpm
+        if all(abs(rpm / other.spindle_speed_rpm - 1.0) > _SAME for other in kept):
+            kept.append(speed)
+    return tuple(kept)
 
 
 class _KnownCut(NamedTuple):
@@ -208,16 +226,18 @@ class _KnownCut(NamedTuple):
     depth: float
     contacts: tuple[bool, ...]
 
-    def roots(self, rpm: float) -> list[complex]:
-        """The rightmost root at a speed, rev/min, in each contact."""
-        return [
-            rightmost_root(self.machine, rpm, self.depth, seated=seated)
-            for seated in self.contacts
-        ]
+    def roots(self, speeds: Array) -> NDArray[np.complex128]:
+        """The rightmost roots at speeds (n,), rev/min, in each contact (contacts, n)."""
+        return np.array(
+            [
+                rightmost_roots(self.machine, speeds, self.depth, seated=seated)
+                for seated in self.contacts
+            ]
+        )
 
     def growth_rate(self, rpm: float) -> float:
         """The greatest of them, 1/s."""
-        return max(root.real for root in self.roots(rpm))
+        return float(self.roots(np.array([rpm])).real.max())
 
 
 def _wide_enough(
@@ -252,12 +272,8 @@ def _centred(
 ) -> AdvisedSpeed:
     """The middle of the stable speeds around a stable one, and how wide they are."""
     rpm = speed.spindle_speed_rpm
-    speeds = rpm * np.linspace(1.0 - _AROUND, 1.0 + _AROUND, _TRIED)
-    growths = [
-        rightmost_roots(cut.machine, speeds, cut.depth, seated=seated).real
-        for seated in cut.contacts
-    ]
-    stable = np.max(growths, axis=0) < 0.0
+    speeds = np.asarray(rpm * np.linspace(1.0 - _AROUND, 1.0 + _AROUND, _TRIED), np.float64)
+    stable = cut.roots(speeds).real.max(axis=0) < 0.0
     stable &= (speeds >= speed_range[0]) & (speeds <= speed_range[1])
     low = high = _TRIED // 2
     while low > 0 and stable[low - 1]:
@@ -276,7 +292,7 @@ def _stable_in(
     cut: _KnownCut, limits: tuple[float, float], current_rpm: float
 ) -> list[tuple[float, AdvisedSpeed]]:
     """The lowest of the damping ratios in the contacts, and its speed."""
-    found = []
+    speeds: list[float] = []
     for seated in cut.contacts:
         advice = recommend_speeds(
             cut.machine,
@@ -287,30 +303,37 @@ def _stable_in(
             current_rpm=min(max(current_rpm, limits[0]), limits[1]),
             count=_CANDIDATES,
         )
-        for speed in advice.speeds:
-            rpm = speed.spindle_speed_rpm
-            roots = cut.roots(rpm)
-            ratio = min(-root.real / root.imag for root in roots)
-            if ratio > 0.0:
-                found.append((ratio, AdvisedSpeed(rpm, max(root.real for root in roots))))
-    return found
+        speeds += [speed.spindle_speed_rpm for speed in advice.speeds]
+    if not speeds:
+        return []
+    roots = cut.roots(np.array(speeds))
+    ratios, growths = (-roots.real / roots.imag).min(axis=0), roots.real.max(axis=0)
+    return [
+        (ratio, AdvisedSpeed(rpm, growth))
+        for ratio, rpm, growth in zip(ratios.tolist(), speeds, growths.tolist(), strict=True)
+        if ratio > 0.0
+    ]
 
 
 def _less_depth(cut: _KnownCut, speed_range: tuple[float, float], error: float) -> Advice:
-    """The deepest cut that some speed keeps stable, in every contact."""
-    shallower, rpm = cut.depth, math.nan
-    for seated in cut.contacts:
-        advice = recommend_speeds(
-            cut.machine,
-            shallower,
-            seated=seated,
-            low_rpm=speed_range[0],
-            high_rpm=speed_range[1],
-            count=1,
+    """The deepest cut that some speed keeps stable, in every contact.
+
+    Args:
+        cut: For which no speed is stable.
+        speed_range: Lowest and highest speed allowed, rev/min.
+        error: Standard error of C w, as a part of it.
+    """
+    low, high = speed_range
+    for _ in range(_LOOKS):
+        speeds = np.geomspace(low, high, _LOOKED_AT)
+        limits = np.min(
+            [critical_depths(cut.machine, speeds, seated=seated) for seated in cut.contacts],
+            axis=0,
         )
-        shallower, rpm = advice.stable_depth, advice.stable_speed_rpm
+        best = int(np.argmax(limits))
+        low, high = speeds[max(best - 1, 0)], speeds[min(best + 1, _LOOKED_AT - 1)]
     share = _SHARE / (1.0 + 2.0 * min(error, 1.0))
-    return Advice((), share * shallower / cut.depth, rpm)
+    return Advice((), share * min(float(limits[best]) / cut.depth, 1.0), float(speeds[best]))
 
 
 def rule_of_thumb(frequency: float, speed_range: tuple[float, float]) -> Advice:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lathe_chatter.detection.speed_advice import ANOTHER_SPEED, Advice, advise, rule_of_thumb
 from lathe_chatter.model import Machine
@@ -13,7 +13,7 @@ from lathe_chatter.model.machine_file import narrowed
 
 SPEEDS = (60.0, 30_000.0)
 """Slowest and fastest speed to recommend where nothing else is said, rev/min."""
-_ADVISED_AT = (0, 2, 4, 7, 10, 15, 20, 30)
+_ADVISED_AT = (0, 3, 10, 30)
 """Hops after the alarm, and after a change of speed that was no cure, at which a speed is
 recommended, each time from a better estimate."""
 _WITHIN_REACH = 2.0
@@ -62,17 +62,20 @@ class AdviceRequest:
         speed_range: Slowest and fastest spindle speed that may be recommended, rev/min.
         earlier: Of the same cut, from an estimate that was less sure: its answer is kept to unless
             another is clearly better.
+        changed: Whether it is `earlier` itself for another depth or range of speeds: however often
+            these change, what is kept to is the answer before the first change.
     """
 
     known: Identified
     machine: Machine | None
     speed_range: tuple[float, float]
     earlier: AdviceRequest | None = field(default=None, repr=False, compare=False)
+    changed: bool = field(default=False, repr=False, compare=False)
 
     def within(self, speed_range: tuple[float, float]) -> AdviceRequest:
         """The same with another range of speeds: itself, with its answer, where it is the same."""
         same = speed_range == self.speed_range
-        return self if same else replace(self, speed_range=speed_range, earlier=self)
+        return self if same else self._changed(speed_range=speed_range)
 
     def at_depth(self, factor: float) -> AdviceRequest | None:
         """For a depth of cut that is so many times as large, nan for unknown: None then."""
@@ -84,22 +87,25 @@ class AdviceRequest:
         known = self.known._replace(
             cutting_stiffness=factor * cutting, cutting_error=factor * error
         )
-        return replace(self, known=known, earlier=self)
+        return self._changed(known=known)
+
+    def _changed(self, **changes: Any) -> AdviceRequest:
+        earlier = self.earlier if self.changed else self
+        return replace(self, **changes, earlier=earlier, changed=True)
 
     @cached_property
     def answer(self) -> Advice:
         """What to do, some 10 ms after it is asked for first."""
-        known = self.known
+        known, (slowest, fastest) = self.known, self.speed_range
+        if fastest >= SPEEDS[1]:  # nobody has said what the spindle can
+            fastest = min(_WITHIN_REACH * known.spindle_speed_rpm, fastest)  # may be nan
         if self.machine is None:
-            slowest, fastest = self.speed_range
-            if fastest >= SPEEDS[1]:  # nobody has said what the spindle can
-                fastest = min(_WITHIN_REACH * known.spindle_speed_rpm, fastest)  # may be nan
             found = rule_of_thumb(known.frequency, (slowest, fastest))
         else:
             found = advise(
                 self.machine,
                 known.cutting_stiffness,
-                self.speed_range,
+                (slowest, fastest),
                 known.spindle_speed_rpm,
                 seated=_seated(self.machine, known.workpiece_stiffness),
                 cutting_error=known.cutting_error,
@@ -135,11 +141,15 @@ class SpeedAdviser:
         """Nothing chatters yet."""
         self.machine = machine
         self.speed_range = speed_range
-        self._advised_at = math.nan
         self.forget()
 
     def forget(self) -> None:
-        """There is no chatter."""
+        """Begin anew, as with another run."""
+        self._advised_at = math.nan
+        self.end()
+
+    def end(self) -> None:
+        """There is no chatter; where some was, what is tried against it is not forgotten."""
         self.request: AdviceRequest | None = None
         self._error = math.inf
         self._surely_grew = -math.inf
@@ -183,7 +193,7 @@ class SpeedAdviser:
             modelled: Whether C w was identified; else the rule 60 f_c / k has to do.
         """
         if hops_after_alarm == 0:
-            self.forget()
+            self.end()
         growth, error = known.growth_rate, known.growth_error
         if growth < -error or error > _VAGUE:
             return  # it dies down, or nobody knows

@@ -47,6 +47,8 @@ _REST_ON_WATCH = 10_000_000
 """ns, likewise, while the vibration grows: an alarm may be due."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
+_ADVISED = 'recommended_speed_rpm'
+"""The figure that has to be looked for."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
 _UNKNOWN = 'unknown'
@@ -92,8 +94,7 @@ class MonitorNode(ParameterNode):
         self._lathe_cut = LatheCutWatch(self, self._follow_depth, self._ask)
         self._continuity, self._since, self._complaint = Continuity(), 'nothing yet', ''
         self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
-        self._logged_advice, self._mode = Advice(), Mode.WAITING
-        self._faults: tuple[str, ...] = ()
+        self._logged_advice, self._mode, self._faults = Advice(), Mode.WAITING, tuple[str, ...]()
         self._senders, self._silent = list[str](), False  # several senders: nothing is judged
         self._heard_at = self._leapt_at = self._newest = self._next_report = -math.inf
         self._figures, self._details = dict[str, float](), dict[str, object]()
@@ -146,14 +147,11 @@ class MonitorNode(ParameterNode):
         self._complaint = ''
         # Of a machine that is yet to be told the spindle may not have the speed; one that has just
         # been told soon knows better.
-        rule = estimate.request is not None and estimate.request.machine is None
-        if rule and (self._awaits_machine() or estimate.mode.knows_machine):
-            estimate = replace(estimate, request=None)
+        if estimate.request is not None and estimate.request.machine is None:
+            asked, senders = self._asked, self._subscription.publishers()
+            if estimate.mode.knows_machine or (asked is not None and asked.is_awaited(senders)):
+                estimate = replace(estimate, request=None)
         self._publish(estimate)
-
-    def _awaits_machine(self) -> bool:
-        asked = self._asked
-        return asked is not None and asked.is_awaited(self._subscription.publishers())
 
     def _complain(self, error: LatheChatterError) -> None:
         self._complaint = str(error)
@@ -272,31 +270,37 @@ class MonitorNode(ParameterNode):
         getattr(self.bounded_log, SENTENCES[kind].severity)(text, kind)
 
     def _publish(self, estimate: Estimate) -> None:
-        """Publish what is new, the figures before the flag that they explain."""
-        changed = estimate.state != self._state or estimate.chatter != self._flag
-        if changed or estimate.time >= self._next_report:
+        """Publish what is new: the figures, the flag that they explain, and what to do."""
+        flagged = estimate.chatter != self._flag
+        changed = flagged or (estimate.state, estimate.faults) != (self._state, self._faults)
+        if is_due := changed or estimate.time >= self._next_report:
             if math.isfinite(estimate.time):  # not before the first hop
                 self._next_report = (estimate.time // _REPORT_PERIOD + 1.0) * _REPORT_PERIOD
-            self._publish_figures(estimate)
+            self._figures = {}
+            self._publish_figures(estimate, *(name for name in FIGURES if name != _ADVISED))
         self._set_state(estimate.state)
-        if estimate.faults != self._faults:
-            self._faults, changed = estimate.faults, True
+        if flagged:
+            self._set_flag(estimate.time, raised=estimate.chatter)
+        if is_due:  # no flag waits until a speed has been found
+            self._publish_figures(estimate, _ADVISED)
             self._details = details(estimate)
+        self._say_what_is_new(estimate, flagged=flagged)
+        if changed:
+            self._diagnostics.publish_changes(self._statuses())
+
+    def _say_what_is_new(self, estimate: Estimate, *, flagged: bool) -> None:
+        if estimate.faults != self._faults:
+            self._faults = estimate.faults
             self._say('sensors' if self._faults else 'sensors well', sensors(estimate))
         if estimate.mode is not self._mode:
             self._say_machine_fit(estimate)
-        if estimate.chatter != self._flag:
-            self._set_flag(estimate.time, raised=estimate.chatter)
-            if self._flag:
-                self._say('onset', onset(estimate))
-            else:
-                self._say('clearance', clearance(estimate))
+        if flagged:
+            kind, sentence = ('onset', onset) if self._flag else ('clearance', clearance)
+            self._say(kind, sentence(estimate))
             self._logged_advice = estimate.advice
         elif advice := estimate.advice.after(self._logged_advice):
             self._say('advice', f'At {estimate.time:.6f} s: {advice}.')
             self._logged_advice = estimate.advice
-        if changed:
-            self._diagnostics.publish_changes(self._statuses())
 
     def _say_machine_fit(self, estimate: Estimate) -> None:
         """That the machine is believed no more, otherwise, or again."""
@@ -355,10 +359,7 @@ class MonitorNode(ParameterNode):
         cut = {'state': self._state, 'flag': self._flag, **since, **self._figures, **self._details}
         # Whether the chatter of a flag that is up goes on is not known then.
         level = WARN if self._silent and self._flag else _LEVELS.get(self._state, OK)
-        return [
-            self._samples_status(silent=silent),
-            Status('cut', level, self._state, cut),
-        ]
+        return [self._samples_status(silent=silent), Status('cut', level, self._state, cut)]
 
     def _samples_status(self, *, silent: bool) -> Status:
         heard = self._continuity

@@ -26,7 +26,8 @@ from lathe_chatter.supervisor import ASKS
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
+_RECOMMENDED = 'recommended_speed_rpm'
+_ESTIMATES = ('growth_rate', 'frequency', 'amplitude', _RECOMMENDED)
 
 
 class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on Jazzy
@@ -67,8 +68,9 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         self.create_subscription(
             Float64MultiArray, 'lathe/samples', self._on_samples, _NEWEST, raw=True
         )
-        # The monitor publishes its figures before the flag that they explain. Of what is ready
-        # together the executor serves first what was subscribed to first.
+        # The monitor publishes its figures before the flag that they explain, and after it the
+        # speed that it recommends. Of what is ready together the executor serves first what was
+        # subscribed to first.
         for name in _ESTIMATES:
             self.create_subscription(
                 Float64, f'chatter_monitor/{name}', self._estimate_taker(name), QoSProfile(depth=1)
@@ -88,7 +90,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         samples, columns = self._decoder.decode(data)
         self.time = float(samples[-1, columns.index('time')])
         if self.playing and not self._in_flight:
-            step = self.player.due(self.time, self._estimates['recommended_speed_rpm'])
+            step = self.player.due(self.time, self._estimates[_RECOMMENDED])
             if step is not None:
                 self._play(step)
 
@@ -111,6 +113,8 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         what = self.player.on_flag(
             self.time, known['frequency'], known['growth_rate'], up=message.data
         )
+        if what and message.data:  # what was recommended before was for another chatter
+            self._estimates[_RECOMMENDED] = math.nan
         if what:
             self._log(f'{self.time:7.2f} s  {what}')
 

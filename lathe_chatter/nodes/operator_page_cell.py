@@ -158,6 +158,8 @@ class OperatedCell:
     def _on_flag(self, message: Bool) -> None:
         """The lamp; since when it is lit or out, the monitor's diagnostics say."""
         self.board.put('flag', {'up': message.data})
+        if message.data:  # what was recommended before was for another chatter
+            self._figures.pop('recommended_speed_rpm', None)
         if self._player is not None:
             found = [self._figures.get(n, (math.nan,))[0] for n in ('frequency', 'growth_rate')]
             self._player.on_flag(self._signals.time, *found, up=message.data)

@@ -55,6 +55,34 @@ def test_where_no_speed_is_stable_the_depth_is_reduced_no_more_than_it_must(seed
     )
 
 
+@pytest.mark.parametrize('speeds', [(500.0, 3000.0), (1000.0, 6000.0), (60.0, 30_000.0)])
+def test_a_reduced_depth_is_stable_whether_or_not_the_bearing_carries(
+    speeds: tuple[float, float],
+) -> None:
+    machine = Machine()
+    for depth in (1.5e-3, 3e-3, 8e-3, 2e-2):
+        advice = advise(machine, machine.cutting_stiffness(depth), speeds, 1500.0)
+        if advice.speeds:
+            continue
+        at, reduced = advice.depth_speed_rpm, advice.depth_factor * depth
+        for seated in (False, True):
+            assert rightmost_root(machine, at, reduced, seated=seated).real < 0.0
+        every = np.geomspace(*speeds, 3000)
+        growths = [
+            rightmost_roots(machine, every, 1.05 * reduced, seated=s).real for s in (False, True)
+        ]
+        assert np.max(growths, axis=0).min() > 0.0
+
+
+def test_speeds_that_are_recommended_differ() -> None:
+    machine = Machine()
+    stiffness = machine.cutting_stiffness(1e-3)
+    advice = advise(machine, stiffness, (1000.0, 6000.0), 1500.0)
+    speeds = sorted(speed.spindle_speed_rpm for speed in advice.speeds)
+    assert len(speeds) == 3
+    assert min(np.diff(speeds) / speeds[:-1]) > 0.02
+
+
 def test_of_a_speed_without_stable_ones_around_it_the_width_is_told_as_less_than_was_tried() -> (
     None
 ):

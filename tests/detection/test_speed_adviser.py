@@ -203,3 +203,41 @@ def test_advice_keeps_to_what_it_said_unless_another_speed_is_clearly_better() -
     assert better > 1.1 * near
     assert [each > 1.1 * near for each in alone] == [False, True, False, True, True]
     assert [each > 1.1 * near for each in said] == [False, False, False, False, True]
+
+
+def test_however_often_the_depth_changes_one_answer_is_found_for_the_last() -> None:
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=1.1e-3, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    request = _watch(detector, lathe, 1.5)[-1].request
+    assert request is not None
+    for _ in range(2000):
+        detector.follow_depth(1.0001)
+    last = _watch(detector, lathe, 0.01)[-1]
+    assert last.request is not None
+    assert last.request.earlier is request
+    assert last.request.known.cutting_stiffness == pytest.approx(
+        1.0001**2000 * request.known.cutting_stiffness
+    )
+    assert last.advice.speeds
+
+
+def test_where_nobody_says_what_the_spindle_can_a_speed_within_reach_is_recommended() -> None:
+    """The chatter of the teacher: far above 20,000 rev/min a lobe is better damped."""
+    machine, cut = Machine(), Machine().cutting_stiffness(1.5e-3)
+    known = Identified(5.0, 1.0, 120.0, 3536.0, cut, machine.workpiece.stiffness)
+    anything = AdviceRequest(known, machine, SPEEDS).answer.speeds[0].spindle_speed_rpm
+    assert anything <= 2.0 * 3536.0
+    told = AdviceRequest(known, machine, (60.0, 29_000.0)).answer.speeds[0].spindle_speed_rpm
+    assert told > 20_000.0
+
+
+def test_another_run_has_nothing_of_what_was_advised_in_the_one_before() -> None:
+    unsure = Identified(0.5, 1.0, 120.0, 3000.0, 5250.0, 1.5e4)
+    adviser = SpeedAdviser(Machine(), SPEEDS)
+    adviser.consider(Identified(5.0, 1.0, 120.0, 2000.0, 5250.0, 1.5e4), 0, modelled=True)
+    adviser.end()
+    adviser.consider(unsure, 0, modelled=True)
+    assert adviser.request is None  # 3000 rev/min may yet be the cure
+    adviser.forget()
+    adviser.consider(unsure, 0, modelled=True)
+    assert adviser.request is not None

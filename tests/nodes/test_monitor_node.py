@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
-from support.node_bench import LATCHED, Bench
+from support.node_bench import DEEP, LATCHED, Bench
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
@@ -378,6 +379,31 @@ def test_without_a_model_chatter_is_flagged_all_the_same(
         ),
         'the mode',
     )
+
+
+def test_no_flag_waits_until_a_speed_has_been_found(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    """Sent are the figures that explain the flag, the flag, and then the speed."""
+    sent: dict[str, list[tuple[int, Any]]] = {}
+
+    def listen(kind: Any, name: str, qos: QoSProfile) -> None:
+        def take(message: Any, info: dict[str, int]) -> None:
+            sent.setdefault(name, []).append((info['source_timestamp'], message.data))
+
+        bench.node.create_subscription(kind, f'/chatter_monitor/{name}', take, qos)
+
+    lathe = machine(STABLE)
+    listen(Bool, 'chatter', LATCHED)
+    for name in ('growth_rate', 'recommended_speed_rpm'):
+        listen(Float64, name, DEEP)
+    lathe.cut(3.0)
+    lathe.lathe.retune(UNSTABLE)
+    lathe.cut(3.0)
+    bench.spin_until(lambda: 'recommended_speed_rpm' in sent, 'a speed')
+    flagged = next(stamp for stamp, up in sent['chatter'] if up)
+    assert flagged < sent['recommended_speed_rpm'][0][0]
+    assert sent['growth_rate'][0][0] < flagged
 
 
 def test_the_recorder_keeps_all_that_the_monitor_says(start: Callable[..., Any]) -> None:
