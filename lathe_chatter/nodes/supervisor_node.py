@@ -15,6 +15,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -29,6 +30,7 @@ from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
+from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
@@ -92,12 +94,12 @@ class SupervisorNode(ParameterNode):
             take = partial(self._on_figure, name)
             self.create_subscription(Float64, f'chatter_monitor/{name}', take, QoSProfile(depth=1))
         for kind, topic, qos, hear in (
-            (Bool, 'chatter_monitor/chatter', _LATCHED, self._on_flag),
             (String, 'chatter_monitor/state', _LATCHED, self._on_state),
             (DiagnosticArray, '/diagnostics', QoSProfile(depth=10), self._on_diagnostics),
             (ParameterEvent, '/parameter_events', QoSProfile(depth=100), self._on_event),
         ):
             self.create_subscription(kind, topic, hear, qos)
+        self._flags = PolledSubscription(self, Bool, 'chatter_monitor/chatter', _LATCHED)
         topic = '~/action'
         self._action = self.create_publisher(
             String, topic, _SENTENCES, qos_overriding_options=publisher_overrides(self, topic)
@@ -156,8 +158,11 @@ class SupervisorNode(ParameterNode):
         self._heard_at = time.monotonic()
         self._figures[name] = message.data, self._heard_at
 
-    def _on_flag(self, message: Bool) -> None:
-        self._chatter = message.data
+    def _hears_chatter(self) -> bool | None:
+        """The flag as it is now, also in the middle of a decision; None until it was heard."""
+        for data, _ in self._flags.take():
+            self._chatter = deserialize_message(data, Bool).data
+        return self._chatter
 
     def _on_state(self, message: String) -> None:
         self._state, self._heard_at = message.data, time.monotonic()
@@ -215,7 +220,7 @@ class SupervisorNode(ParameterNode):
     # -- acting --------------------------------------------------------------------------------
 
     def _seen(self, cut: Cut) -> Seen:
-        now = time.monotonic()
+        now, flag = time.monotonic(), self._hears_chatter()
         # What is not known any more is not published any more.
         figures = {n: value for n, (value, at) in self._figures.items() if now < at + _SILENCE}
         heard = self._reports.values(self._monitor, 'cut')
@@ -225,12 +230,13 @@ class SupervisorNode(ParameterNode):
         return Seen(
             now,
             cut,
-            bool(self._chatter),
+            bool(flag),
             **figures,
             cutting_stiffness=stiffness,
             tool_frequency=float(heard.get(TOOL_FREQUENCY, math.nan)),
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             hindrance=self._hindrance(now),
+            flag_stays=lambda: self._hears_chatter() == flag,
         )
 
     def _hindrance(self, now: float) -> str:
@@ -252,7 +258,7 @@ class SupervisorNode(ParameterNode):
             if time.monotonic() > self._answer[1] + _NO_ANSWER:
                 self._answer = None
                 self._say_of(self._core.refused('it does not answer'))
-        elif self._cut is not None and self._chatter is not None:
+        elif self._cut is not None and self._hears_chatter() is not None:
             self._do(self._core.look(self._seen(self._cut)))
 
     def _on_accept(self, _request: Any, response: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import chain
@@ -77,6 +77,8 @@ class Seen:
         tool_frequency: That the monitor has put in the place of the told one, Hz.
         spindle_acceleration: At which the spindle follows a change, rev/min per s; 0: at once.
         hindrance: Why nothing may be done, as the end of a sentence; empty where it may.
+        flag_stays: Whether the flag is as it was, asked once a move has been found: to look for
+            one takes up to a second.
     """
 
     time: float
@@ -90,6 +92,7 @@ class Seen:
     tool_frequency: float = math.nan
     spindle_acceleration: float = 0.0
     hindrance: str = ''
+    flag_stays: Callable[[], bool] = field(default=lambda: True, compare=False)
 
 
 @dataclass(frozen=True)
@@ -233,6 +236,8 @@ class Supervisor:
         )
         for move in chain.from_iterable(found):
             if not any(_same(move.cut, cut) for cut in (seen.cut, *self._tried)):
+                if not seen.flag_stays():
+                    return None
                 changes = move.changes_from(seen.cut)
                 said = f'{why}: {{}} set {change_words(changes, seen.cut)} ({expectation(move)})'
                 settling = min(SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)

@@ -59,6 +59,14 @@ def test_of_a_flag_that_was_up_before_no_time_is_said(*, quiet_before: bool, whe
     assert action.sentence == f'The chatter has ended{when}; 0 moves.'
 
 
+def test_no_move_is_made_where_the_flag_fell_while_one_was_looked_for() -> None:
+    there = chattering(disturb=lambda _there, seen: replace(seen, flag_stays=lambda: False))
+    there.run(2.5)  # in which it moves where the flag stays
+    assert not there.moves
+    assert not there.said
+    assert there.supervisor.moves == 0
+
+
 def test_the_ramp_is_kept() -> None:
     there = chattering(limits=Limits(ramp=1000.0))
     there.run(2.5)
