@@ -320,12 +320,11 @@ class MonitorNode(ParameterNode):
             self._state = state
             self._state_publisher.publish(String(data=state))
 
-    def _publish_figures(self, estimate: Estimate) -> None:
-        figures = {name: float(getattr(estimate, name)) for name in FIGURES}
-        self._figures = {name: value for name, value in figures.items() if math.isfinite(value)}
-        self._details = details(estimate)
-        for name, value in self._figures.items():
-            self._figure_publishers[name].publish(Float64(data=value))
+    def _publish_figures(self, estimate: Estimate, *names: str) -> None:
+        for name in names:
+            if math.isfinite(value := float(getattr(estimate, name))):
+                self._figures[name] = value
+                self._figure_publishers[name].publish(Float64(data=value))
 
     def _publisher(self, kind: Any, name: str, qos: QoSProfile) -> Publisher:
         topic = f'~/{name}'
