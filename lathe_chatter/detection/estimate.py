@@ -20,8 +20,11 @@ IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN = (
     'unknown',
 )
 STATES = (IDLE, STABLE, WATCH, CHATTER, FORCED, UNKNOWN)
-FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
+RECOMMENDED_SPEED = 'recommended_speed_rpm'
+FIGURES = ('growth_rate', 'frequency', 'amplitude', RECOMMENDED_SPEED, 'margin')
 """What of an estimate is published, where it is known, each under its name."""
+HEARD = tuple(name for name in FIGURES if name != RECOMMENDED_SPEED)
+"""Those that need not be looked for."""
 
 
 class Mode(str, Enum):

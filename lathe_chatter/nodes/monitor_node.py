@@ -15,7 +15,7 @@ from std_msgs.msg import Bool, Float64, String
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection import Advice, ChatterDetector, Estimate
-from lathe_chatter.detection.estimate import FIGURES, Mode
+from lathe_chatter.detection.estimate import FIGURES, HEARD, RECOMMENDED_SPEED, Mode
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model import Machine
 from lathe_chatter.model.lathe_parameter_table import machine_in_cut
@@ -47,8 +47,6 @@ _REST_ON_WATCH = 10_000_000
 """ns, likewise, while the vibration grows: an alarm may be due."""
 _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
-_ADVISED = 'recommended_speed_rpm'
-"""The figure that has to be looked for."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
 _UNKNOWN = 'unknown'
@@ -277,12 +275,12 @@ class MonitorNode(ParameterNode):
             if math.isfinite(estimate.time):  # not before the first hop
                 self._next_report = (estimate.time // _REPORT_PERIOD + 1.0) * _REPORT_PERIOD
             self._figures = {}
-            self._publish_figures(estimate, *(name for name in FIGURES if name != _ADVISED))
+            self._publish_figures(estimate, *HEARD)
         self._set_state(estimate.state)
         if flagged:
             self._set_flag(estimate.time, raised=estimate.chatter)
         if is_due:  # no flag waits until a speed has been found
-            self._publish_figures(estimate, _ADVISED)
+            self._publish_figures(estimate, RECOMMENDED_SPEED)
             self._details = details(estimate)
         self._say_what_is_new(estimate, flagged=flagged)
         if changed:

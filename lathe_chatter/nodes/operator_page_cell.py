@@ -15,6 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
+from lathe_chatter.detection.estimate import FIGURES, RECOMMENDED_SPEED
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE
 from lathe_chatter.nodes.diagnostics import DiagnosticsListener
@@ -31,7 +32,6 @@ from lathe_chatter.scenario.player import ScenarioPlayer
 from lathe_chatter.scenario.scenario import ASKED, CLEARED, FLAGGED
 from lathe_chatter.supervisor import ASKS
 
-FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm', 'margin')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LOSSY = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """The page holds up no lathe that waits for its readers."""
@@ -159,7 +159,7 @@ class OperatedCell:
         """The lamp; since when it is lit or out, the monitor's diagnostics say."""
         self.board.put('flag', {'up': message.data})
         if message.data:  # what was recommended before was for another chatter
-            self._figures.pop('recommended_speed_rpm', None)
+            self._figures.pop(RECOMMENDED_SPEED, None)
         if self._player is not None:
             found = [self._figures.get(n, (math.nan,))[0] for n in ('frequency', 'growth_rate')]
             self._player.on_flag(self._signals.time, *found, up=message.data)
@@ -192,7 +192,7 @@ class OperatedCell:
         values = self.clients.values.get('lathe')
         if not values or self._charting:
             return
-        recommended = self._figures_now().get('recommended_speed_rpm')
+        recommended = self._figures_now().get(RECOMMENDED_SPEED)
         speeds = values.get('spindle_speed_rpm'), recommended
         if not fits(self.board.get('chart'), speeds) or chart_key(values) != self._chart_of:
             self._charting, self._chart_of = True, chart_key(values)
@@ -330,7 +330,7 @@ class OperatedCell:
         """Carry out what is due, and end in time."""
         if self.playing is None or self._player is None:
             return
-        recommended, _ = self._figures.get('recommended_speed_rpm', (math.nan, 0.0))
+        recommended, _ = self._figures.get(RECOMMENDED_SPEED, (math.nan, 0.0))
         step = self._player.due(self._signals.time, recommended)
         if step is not None:
             self._show_scenario(step.because or 'a step was made')

@@ -19,6 +19,7 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import SetBool, Trigger
 
+from lathe_chatter.detection.estimate import HEARD
 from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
@@ -43,7 +44,6 @@ _LOSS = 2.0
 """s after lost samples in which nothing is done."""
 _NO_ANSWER = 2.0
 """s in which the lathe has to answer."""
-_FIGURES = ('growth_rate', 'frequency', 'amplitude', 'margin')
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Two may come at once; who comes late has the newest."""
@@ -90,7 +90,7 @@ class SupervisorNode(ParameterNode):
         )
         self._core = self._new_core()
         self._remote = RemoteParameters(self, self._take_parameters)
-        for name in _FIGURES:
+        for name in HEARD:
             take = partial(self._on_figure, name)
             self.create_subscription(Float64, f'chatter_monitor/{name}', take, QoSProfile(depth=1))
         for kind, topic, qos, hear in (
@@ -158,7 +158,7 @@ class SupervisorNode(ParameterNode):
         self._heard_at = time.monotonic()
         self._figures[name] = message.data, self._heard_at
 
-    def _hears_chatter(self) -> bool | None:
+    def _newest_flag(self) -> bool | None:
         """The flag as it is now, also in the middle of a decision; None until it was heard."""
         for data, _ in self._flags.take():
             self._chatter = deserialize_message(data, Bool).data
@@ -220,7 +220,7 @@ class SupervisorNode(ParameterNode):
     # -- acting --------------------------------------------------------------------------------
 
     def _seen(self, cut: Cut) -> Seen:
-        now, flag = time.monotonic(), self._hears_chatter()
+        now, flag = time.monotonic(), self._newest_flag()
         # What is not known any more is not published any more.
         figures = {n: value for n, (value, at) in self._figures.items() if now < at + _SILENCE}
         heard = self._reports.values(self._monitor, 'cut')
@@ -236,7 +236,7 @@ class SupervisorNode(ParameterNode):
             tool_frequency=float(heard.get(TOOL_FREQUENCY, math.nan)),
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             hindrance=self._hindrance(now),
-            flag_stays=lambda: self._hears_chatter() == flag,
+            flag_stays=lambda: self._newest_flag() == flag,
         )
 
     def _hindrance(self, now: float) -> str:
@@ -258,7 +258,7 @@ class SupervisorNode(ParameterNode):
             if time.monotonic() > self._answer[1] + _NO_ANSWER:
                 self._answer = None
                 self._say_of(self._core.refused('it does not answer'))
-        elif self._cut is not None and self._hears_chatter() is not None:
+        elif self._cut is not None and self._newest_flag() is not None:
             self._do(self._core.look(self._seen(self._cut)))
 
     def _on_accept(self, _request: Any, response: Any) -> Any:

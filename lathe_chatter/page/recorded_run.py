@@ -39,7 +39,6 @@ _FEWEST, _STRETCH, _MOST = 500, 0.002, 2_000_000
 _CLOSEUP = 1.0
 _SLACK = 300_000_000
 """ns about a time of reception within which a sample is looked for."""
-_ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 
 
 class RecordedRun:
@@ -247,7 +246,7 @@ class RecordedRun:
             cell['figures'] = {
                 name: value_near(series, time)
                 for name, series in history.estimates.items()
-                if name in _ESTIMATES and np.any(np.abs(series[0] - time) < 1.0)
+                if np.any(np.abs(series[0] - time) < 1.0)
             }
             recommended = cell['figures'].get('recommended_speed_rpm')
             cell['chart'] = self._chart(history, time, recommended)
