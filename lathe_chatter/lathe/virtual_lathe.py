@@ -148,7 +148,7 @@ class VirtualLathe:
     def spindle_angle(self) -> float:
         """Revolutions since the start."""
         numbers = self._state.numbers
-        turn = self._state.constants.settings[layout.TURN]
+        turn = self._flat[layout.TURN]  # constants begin with the settings
         turned = numbers[layout.ORIGIN_LOW] + numbers[layout.PLACE] * (1.0 / turn)
         return float(numbers[layout.ORIGIN] + turned)
 
