@@ -16,6 +16,7 @@ from lathe_chatter.dataset.generation import make_part, parts_of
 from lathe_chatter.dataset.windows import drawn_machine
 from lathe_chatter.errors import DatasetError
 from lathe_chatter.executors import cores, width_of
+from lathe_chatter.lathe.doubts import doubts
 
 EXAMPLE = 'lathe-chatter dataset examples/datasets/chatter.yaml --output data/chatter'
 
@@ -41,9 +42,10 @@ def run(options: Namespace) -> int:
     plan = load_plan(options.plan)
     folder = utf8('--output', options.output or Path(options.plan.stem))
     screen = Screen(json=options.json)
-    for doubt in (*plan.doubts, *drawn_machine(plan, 0).lathe().doubts):
-        screen.say(f'WARNING  {doubt}')
     screen.compile()
+    first = drawn_machine(plan, 0)
+    for doubt in (*plan.doubts, *doubts(first.setup, first.cut)):
+        screen.say(f'WARNING  {doubt}')
     if options.workers is None and options.cluster is None:
         options.workers = cores()
     cost, parts = None, [folder / name for name in parts_of(plan)]

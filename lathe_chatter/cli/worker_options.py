@@ -22,7 +22,8 @@ _SETTINGS = {
     'distributed.admin.large-graph-warning-threshold': '1 GB',
 }
 """Of Dask. As it sets its workers, each block of samples is given back to the system and asked for
-again, which takes half as long as computing it; and it warns of batches of many lathes."""
+again, which takes half as long as computing it; each of its processes wakes 50 times a second; and
+it warns of batches of many lathes."""
 
 
 def add_executor(parser: ArgumentParser, usual: str = 'threads, one a core') -> None:

@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.quantity_fields import limits_of
-from lathe_chatter.stability import (
-    critical_depths,
-    recommend_speeds,
-    rightmost_roots,
-)
+from lathe_chatter.stability import critical_depths, recommend_speeds, rightmost_roots
 
 _CANDIDATES = 8
 _DAMPED = 0.01

@@ -98,9 +98,8 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         """Finish, say what is still to be said, and go."""
         try:
             self.finish()
-            if hasattr(
-                self, 'bounded_log'
-            ):  # Kilted destroys nodes, too, that were refused half-made
+            # Kilted destroys nodes, too, that were refused half-made.
+            if hasattr(self, 'bounded_log'):
                 self.bounded_log.end()
         finally:
             super().destroy_node()

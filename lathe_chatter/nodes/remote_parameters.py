@@ -35,7 +35,7 @@ CONTACT = 'bearing_contact'
 
 OnMachine = Callable[[Machine, MachineDescription | None], None]
 Answer = Callable[[str, dict[str, Any]], None]
-"""Takes the name of a node and its parameters."""
+"""Takes the name of a node and its parameters; one that is not set is None."""
 
 
 class RemoteParameters:
@@ -184,10 +184,11 @@ class RemoteMachine:
 
     def _take(self, _name: str, values: dict[str, Any]) -> None:
         self._awaited_since = -math.inf  # whatever it says
-        described = bool(values.get(MACHINE_FILE.name))
-        lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in values]
+        known = {name: value for name, value in values.items() if value is not None}
+        described = bool(known.get(MACHINE_FILE.name))
+        lacking = [row.name for row in MACHINE_ROWS if not described and row.name not in known]
         try:
-            machine, file = machine_in_cut(values), described_by(values)
+            machine, file = machine_in_cut(known), described_by(known)
         except LatheChatterError as error:
             self._complain(str(error))
         else:
