@@ -19,8 +19,10 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from support.browser import Browser
 from support.node_bench import Bench
 from support.node_processes import NodeProcesses
+from support.page_cell import Page, looking_at
 
 from lathe_chatter.precompile import precompile
 
@@ -113,3 +115,10 @@ def nodes(domain: int, compiled: None, tmp_path: Path) -> Iterator[NodeProcesses
     yield started
     started.end()
     sys.stdout.write(started.said())
+
+
+@pytest.fixture(scope='module')
+def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
+    """One that has the page of the module's cell open."""
+    with looking_at(page.url(), tmp_path_factory.mktemp('profile')) as browser:
+        yield browser

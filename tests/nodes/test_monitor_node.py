@@ -66,6 +66,7 @@ def test_chatter_is_flagged_with_its_figures_and_cured(
     log = bench.listen(Log, '/rosout', LATCHED)
     lathe = machine(STABLE)
     lathe.cut(2.0)
+    bench.spin_until(lambda: flags, 'the flag as the monitor began')
     assert [flag.data for flag in flags] == [False]
     lathe.lathe.retune(UNSTABLE)
     lathe.cut(2.0)

@@ -6,7 +6,6 @@ import http.client
 import http.server
 import json
 import re
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.browser import Browser, chromium
-from support.page_cell import LAMP, PATIENCE, Page, header_of, looking_at, operate
+from support.page_cell import LAMP, PATIENCE, Page, header_of, operate, recorded_cell
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -28,20 +27,8 @@ if chromium() is None:
 
 @pytest.fixture(scope='module')
 def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]:  # noqa: ARG001
-    page = Page(tmp_path_factory.mktemp('cell'))
-    page.start('operator_page', 'port:=0')
-    page.start('run_recorder', f'output:={page.folder / "run"}')
-    page.start('chatter_monitor')
-    page.start('lathe')
-    yield page
-    page.nodes.end()
-    sys.stdout.write(page.nodes.said())
-
-
-@pytest.fixture(scope='module')
-def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
-    with looking_at(page.url(), tmp_path_factory.mktemp('profile')) as browser:
-        yield browser
+    with recorded_cell(tmp_path_factory.mktemp('cell')) as page:
+        yield page
 
 
 def until_closed(socket: Any) -> None:

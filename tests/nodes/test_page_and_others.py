@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from support.browser import Browser, chromium
-from support.page_cell import LAMP, PATIENCE, Page, header_of, looking_at, operate
+from support.page_cell import LAMP, PATIENCE, Page, cell, header_of, looking_at, operate
 from websockets.sync.client import connect
 
 if chromium() is None:
@@ -21,14 +20,12 @@ TOKEN = 'a token of a test'  # noqa: S105 -- none of a secret
 
 @pytest.fixture(scope='module')
 def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]:  # noqa: ARG001
-    page = Page(tmp_path_factory.mktemp('cell'))
-    page.start('operator_page', 'port:=0', f'token:={TOKEN}')
-    page.start('chatter_monitor')
-    page.start('chatter_supervisor', 'mode:=ask', 'hands_off:=0.5')
-    page.start('lathe', 'bearing_contact:=none')
-    yield page
-    page.nodes.end()
-    sys.stdout.write(page.nodes.said())
+    with cell(tmp_path_factory.mktemp('cell')) as page:
+        page.start('operator_page', 'port:=0', f'token:={TOKEN}')
+        page.start('chatter_monitor')
+        page.start('chatter_supervisor', 'mode:=ask', 'hands_off:=0.5')
+        page.start('lathe', 'bearing_contact:=none')
+        yield page
 
 
 @pytest.fixture(scope='module')

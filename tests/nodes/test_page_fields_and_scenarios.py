@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from support.browser import Browser, chromium
-from support.page_cell import LAMP, PATIENCE, Page, looking_at, operate
+from support.page_cell import LAMP, PATIENCE, Page, operate, recorded_cell
 
 if chromium() is None:
     pytest.skip('no Chromium is here', allow_module_level=True)
@@ -19,20 +18,8 @@ CLOCK = 'document.querySelector("#clock").textContent'
 
 @pytest.fixture(scope='module')
 def page(domain: int, compiled: None, tmp_path_factory: Any) -> Iterator[Page]:  # noqa: ARG001
-    page = Page(tmp_path_factory.mktemp('cell'))
-    page.start('operator_page', 'port:=0')
-    page.start('run_recorder', f'output:={page.folder / "run"}')
-    page.start('chatter_monitor')
-    page.start('lathe', 'force_noise:=0.001')
-    yield page
-    page.nodes.end()
-    sys.stdout.write(page.nodes.said())
-
-
-@pytest.fixture(scope='module')
-def browser(page: Page, tmp_path_factory: Any) -> Iterator[Browser]:
-    with looking_at(page.url(), tmp_path_factory.mktemp('profile')) as browser:
-        yield browser
+    with recorded_cell(tmp_path_factory.mktemp('cell'), 'force_noise:=0.001') as page:
+        yield page
 
 
 @pytest.mark.parametrize('text', ['0,4', '0.4', ' .4 '])

@@ -6,6 +6,7 @@ import json
 import re
 import signal
 import struct
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,6 +42,26 @@ class Page:
             assert time.monotonic() < until, self.nodes.said()
             time.sleep(0.1)
         return str(found[-1])
+
+
+@contextmanager
+def cell(folder: Path) -> Iterator[Page]:
+    """Nodes to start; what they said is printed when they have ended."""
+    page = Page(folder)
+    yield page
+    page.nodes.end()
+    sys.stdout.write(page.nodes.said())
+
+
+@contextmanager
+def recorded_cell(folder: Path, *of_lathe: str) -> Iterator[Page]:
+    """A page with recorder, monitor and a lathe that has some parameters."""
+    with cell(folder) as page:
+        page.start('operator_page', 'port:=0')
+        page.start('run_recorder', f'output:={page.folder / "run"}')
+        page.start('chatter_monitor')
+        page.start('lathe', *of_lathe)
+        yield page
 
 
 @contextmanager
