@@ -45,6 +45,9 @@ _FORGETTING = 0.01
 _RAMP = 3e-3
 """Relative change of speed in `SPEEDS` hops that is a ramp."""
 _RAMP_HOLD = 20
+_DRIFT = 0.01
+"""Relative change of speed since the baseline was heard from which on it is that of another cut:
+what is no ramp over so few hops may be one over the hundreds of the baseline."""
 _NEW, _BETWEEN, _OLD = 8, 4, 16
 """Hops whose means are compared, and hops between them, to find a step of the mean force."""
 _STEP, _STEP_PART = 6.0, 0.04
@@ -141,7 +144,9 @@ def _close_block(state: DetectorState) -> None:
     for row in range(blocks.shape[0] - 1, 0, -1):
         for j in range(blocks.shape[1]):  # a whole row takes 4 s more to compile
             blocks[row, j] = blocks[row - 1, j]
+        state.block_speeds[row] = state.block_speeds[row - 1]
     blocks[0] = 0.0
+    state.block_speeds[1] = state.speeds[0]
     now.block_fill = 0
     now.blocks = min(now.blocks + 1, BLOCK_COUNT + LAG)
     count = now.blocks - LAG
@@ -151,6 +156,14 @@ def _close_block(state: DetectorState) -> None:
             for row in range(1 + LAG, 1 + LAG + count):
                 total += blocks[row, j]
             state.baseline[j] = max(total / count, state.least[j])
+        now.usual_speed = state.block_speeds[1 + LAG : 1 + LAG + count].mean()
+
+
+@compiled(borrows=True, inner=True)
+def has_drifted(state: DetectorState) -> bool:
+    """Whether the baseline is that of another speed."""
+    speed, usual = state.speeds[0], state.now[0].usual_speed
+    return bool(abs(speed - usual) > _DRIFT * usual)
 
 
 @compiled(borrows=True, inner=True)

@@ -29,6 +29,7 @@ from lathe_chatter.detection.baseline import (
     follow_push,
     follow_speed,
     growth_by_energy,
+    has_drifted,
     restart_baseline,
 )
 from lathe_chatter.detection.detector_state import (
@@ -43,6 +44,7 @@ from lathe_chatter.detection.reported_figures import (
     is_cutting,
     shown_amplitude,
     state_of,
+    weigh_vibration,
     write_figures,
 )
 from lathe_chatter.detection.signal_conditioning import PHASE_SEEN
@@ -63,8 +65,8 @@ SMALLEST_GROWTH = 0.2
 _TRUSTED = 3
 """The window by which it is judged whether the signal stands out of the sensors' noise."""
 _AFTER_STEP, _AFTER_CLEAR_STEP = 1.2, 1.3
-"""By how much more the energy must have risen while it is compared with that of another cut: in
-the noise of the sensors, and where the growth rate can tell by itself."""
+"""By how much more the energy must have risen while it is compared with another cut's: in the
+noise of the sensors, and where the growth rate can tell by itself."""
 _SURELY_STABLE = -2.0
 """Growth rate over its error, in one of the shorter windows, that outweighs any rise of energy."""
 _VETO = 0.9
@@ -128,9 +130,9 @@ def _trust(windows: Records) -> float:
 
 
 @compiled(borrows=True, inner=True)
-def _after_step(now: Any, trust: float) -> float:
+def _other_cut(state: DetectorState, trust: float) -> float:
     """By how much more the energy must have risen, for it may be compared with another cut's."""
-    if now.stepped == 0:
+    if state.now[0].stepped == 0 and not has_drifted(state):
         return 1.0
     return _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
 
@@ -158,9 +160,13 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
             score /= _ENERGY_LIMIT * (_BLURRED + (1.0 - _BLURRED) * trust)
         else:
             score /= _ENERGY_ALONE
-        score /= _after_step(now, trust)
+        score /= _other_cut(state, trust)
         first = 0 if model else _SHORTEST_BY_ENERGY
-        if trust >= 0.5 and _surely_stable(windows, first, _TRUSTED + 1):
+        stable = _surely_stable(windows, first, _TRUSTED + 1)
+        if model and has_drifted(state):  # a stable cut is louder at some speeds than at others
+            grows = windows[2].growth > 0.0 and windows[_TRUSTED].growth > 0.0
+            stable = stable or not grows
+        if trust >= 0.5 and stable:
             score = min(score, _VETO)
     loud = not model and rise > _LOUD and now.holding != 0
     free = model or loud or now.since_jump > 12
@@ -187,7 +193,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
 
 @compiled(borrows=True, inner=True)
 def _unchecked_score(
-    now: Any, products: Records, windows: Records, full: float, plain: float
+    state: DetectorState, products: Records, windows: Records, full: float, plain: float
 ) -> float:
     """The same while nobody knows whether the machine was told right: more must speak for it.
 
@@ -196,12 +202,13 @@ def _unchecked_score(
     noise that F = C w h would not hold with another machine.
 
     Args:
-        now: Of the state.
+        state: Before the alarm.
         products: Sums of the last hops (HOPS,), as a ring.
         windows: As identified.
         full: The score by the machine.
         plain: The score without.
     """
+    now = state.now[0]
     if now.holding != 0:
         both = force = chip = 0.0
         for back in range(min(max(1, now.holding - 1), _TRANSIENT)):
@@ -214,7 +221,7 @@ def _unchecked_score(
     trust = _trust(windows)
     if now.rise == now.rise and trust < 1.0:
         limit = _ENERGY_LIMIT * _BLURRED * (1.0 - trust) + _ENERGY_ALONE * trust
-        blurred: float = now.rise / limit / _after_step(now, trust)
+        blurred: float = now.rise / limit / _other_cut(state, trust)
         return max(plain, blurred)
     return plain
 
@@ -363,7 +370,7 @@ def judge(
         state.plain_scores[newest] = _score(state, plain, not model, forced)
     if unchecked and known:
         alone = state.plain_scores[newest]
-        now.score = _unchecked_score(now, products, windows, now.score, alone)
+        now.score = _unchecked_score(state, products, windows, now.score, alone)
     elif model and known and now.rise > ARMED:
         # The machine may be another than was told: what lasts is believed without it.
         lasting = np.inf
@@ -387,6 +394,7 @@ def judge(
         now.saturated = now.saturated + 1 if steady else 0
     _decide(state, amplitude, recent, by_itself)
     write_figures(state, windows, wave, model, amplitude)
+    weigh_vibration(now, products[newest], settings)
     now.shown_amplitude = shown_amplitude(now, products, settings, omega, speed)
     cutting = is_cutting(now, windows[WINDOWS.size - 1], products, settings)
     now.state = state_of(state, settings, cutting, forced)

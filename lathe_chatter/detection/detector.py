@@ -39,7 +39,10 @@ _LOOK = 0.05
 """s from one look for a line above all others to the next."""
 _TURN = 2.0 * math.pi
 _SURE_SIGN = 2.0
-"""Standard errors from which on growth that is read from the vibration has a sign."""
+"""Standard errors from which on growth that is read from the vibration, or a contact, is sure."""
+_CONTACT_ERRORS, _IN_PART = 8.0, 0.1
+"""Standard errors that the bearing's stiffness has at least where it is known what carries the
+workpiece, and the part of it from which on the workpiece rests on it."""
 
 
 class ChatterDetector:
@@ -289,6 +292,13 @@ class ChatterDetector:
             return f'{told}, is taken at {found}, as it is heard'
         return ''
 
+    def _surely(self, state: int) -> int:
+        """The state, which is unknown where `stable` may be said of chatter at its full size."""
+        if state != STABLE or self._mixed:
+            return state
+        lacking = (judge.state.now[0] for judge in self._judges if not judge.believed)
+        return UNKNOWN if any(now['out_of_proportion'] for now in lacking) else state
+
     def _new_estimate(self, time: float) -> Estimate:
         judge = self._judges[self._speaker]
         now = values_of(judge.state.now)  # a field of a record takes longer than all at once
@@ -297,18 +307,14 @@ class ChatterDetector:
             mode = self._without
         if words:
             mode = Mode.CORRECTED if judge.believed else Mode.MISFIT
-        bearing = self._machine.bearing_stiffness if self._machine is not None else 0.0
-        stiffness = now['stiffness'] if bearing else math.nan
-        engaged = None
-        if self._machine is not None and math.isfinite(stiffness):
-            engaged = stiffness > self._machine.workpiece.stiffness + 0.1 * bearing
+        stiffness, engaged = _contact(self._machine, now)
         if self._mixed:  # neither metres nor a growth rate that is one body's
             now |= dict.fromkeys(('growth', 'growth_error', 'shown_amplitude'), math.nan)
         elif not judge.believed and not _sign_is_known(now):
             now['growth'] = math.nan
         return Estimate(
             time,
-            STATES[now['state']],
+            STATES[self._surely(now['state'])],
             bool(now['alarmed']),
             mode,
             now['growth'],
@@ -327,6 +333,20 @@ class ChatterDetector:
             *(judge.margin if mode.knows_machine and not now['alarmed'] else (math.nan, math.nan)),
             self._correction[0] if self._correction and self._lone != 'workpiece' else math.nan,
         )
+
+
+def _contact(machine: Machine | None, now: dict[str, Any]) -> tuple[float, bool | None]:
+    """What carries the workpiece, N/m, and whether its bearing does; nan and None if unknown.
+
+    In the vibration of a quiet cut the error is as large as what the bearing adds, and the value
+    too high besides: it is known only where the one contact is told from the other many times.
+    """
+    bearing = machine.bearing_stiffness if machine is not None else 0.0
+    stiffness, error = now['stiffness'], now['stiffness_error']
+    if machine is None or not _CONTACT_ERRORS * error < bearing:
+        return math.nan, None
+    off = stiffness - machine.workpiece.stiffness - _IN_PART * bearing
+    return stiffness, off > 0.0 if abs(off) > _SURE_SIGN * error else None
 
 
 def _sign_is_known(now: dict[str, Any]) -> bool:

@@ -31,13 +31,13 @@ _NOW = record_type(
     """
     usual_misfit misfits_seen peak_amplitude push score rise once_per_turn spread
     synchronous_amplitude smallest_amplitude strictness amplitude shown_amplitude
-    root_cutting root_stiffness
-    growth growth_error omega cutting cutting_error stiffness
+    root_cutting root_stiffness usual_speed mean_place mean_power
+    growth growth_error omega cutting cutting_error stiffness stiffness_error
     """,
     """
     newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
     block_fill saturated stepped hold_ended
-    fit_hops fit_is_due by_line line_gone strongest since_break
+    fit_hops fit_is_due by_line line_gone strongest since_break out_of_proportion
     """,
     'root deeper_root',
 )
@@ -47,10 +47,12 @@ class DetectorState(NamedTuple):
     """What the judgement remembers, changed in place.
 
     Attributes:
-        now: One record. Figures that are handed out: `growth` to `stiffness`,
+        now: One record. Figures that are handed out: `growth` to `stiffness_error`,
             `shown_amplitude`, `once_per_turn`, `score`. `newest`: place of the newest hop in the
-            rings. `since_break`: hops since the tool may last have left the cut. `root`,
-            `deeper_root`: rightmost roots of a cut like the present one, and of a deeper one.
+            rings. `since_break`: hops since the tool may last have left the cut.
+            `out_of_proportion`: hops for which the vibration is still called so to the tool's mean
+            displacement. `root`, `deeper_root`: rightmost roots of a cut like the present one, and
+            of a deeper one.
         motion: Resonators at the ends of the last hops, as a ring (HOPS, bins).
         usual: Mean product with the hop before, mean square, mean square innovation
             (3, bins); the first complex.
@@ -59,6 +61,7 @@ class DetectorState(NamedTuple):
         least: What it is at least: the energy of a vibration too small to be called chatter
             (bins,). What is left of a cut that has settled without noise are roundings.
         speeds: Of the last hops, rev/s (SPEEDS,).
+        block_speeds: At the ends of the blocks of the baseline, rev/s (blocks,).
         amplitudes: Of the tool in the last hops, as a ring, m (HOPS,).
         line: Mean of the power of each resonator, and of its square (2, bins).
         line_shares: Of the newest power in these means (bins,).
@@ -72,6 +75,7 @@ class DetectorState(NamedTuple):
     baseline: Array
     least: Array
     speeds: Array
+    block_speeds: Array
     amplitudes: Array
     line: Array
     line_shares: Array
@@ -99,6 +103,7 @@ def new_state(least: Array, **values: object) -> DetectorState:
         np.full(bins, np.nan),
         least,
         np.zeros(SPEEDS),
+        np.zeros(BLOCK_COUNT + LAG + 1),
         np.zeros(HOPS),
         np.zeros((2, bins)),
         np.ones(bins),

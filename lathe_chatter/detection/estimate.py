@@ -96,8 +96,10 @@ class Estimate:
         spindle_speed_rpm: rev/min.
         cutting_stiffness: C w, N/m.
         workpiece_stiffness: What carries the workpiece: k_wp, up to k_wp + k_bc, N/m; nan where
-            only one body gives, or there is no bearing.
-        bearing_engaged: Whether the workpiece rests on its bearing, at least in part.
+            its standard error is more than an eighth of k_bc, as in most quiet cuts, only one
+            body gives, or there is no bearing.
+        bearing_engaged: Whether the workpiece rests on its bearing, at least in part; None where
+            that is less sure than by two standard errors.
         once_per_turn: Variance at one spindle angle from turn to turn, over all variance: near
             1 for chatter, near 0 for vibration that is the spindle's own.
         score: Suspicion; 1 raises the alarm.

@@ -37,6 +37,12 @@ _FORGOTTEN = 0.94
 """Of a larger push, per hop: what falls more slowly is the drift of a sensor, no end of a cut."""
 _LEFT, _LEFT_OF_CHATTER, _SHOWN = 0.5, 0.1, 4
 """Part that must be left of a vibration that is not the spindle's own; hops that are shown."""
+_MEAN_TIME, _PROPORTION, _NO_MEAN = 2.0, 4.0, 0.01
+"""s over which means are taken; change over a turn, as an effective value, over the mean from
+which on the tool may leave the cut, and mean over change below which the sensor has none. A force
+that is never negative moves a mode by no more than 1 / damping ratio times the mean."""
+_STAYS = 4.0
+"""s for which that stands where the mean passes through 0."""
 _HEARD, _SURE, _NEXT_TO_NOTHING = 0.15, 3.0, 0.005
 """Part of the signal that is no noise; standard errors; C w over the stiffness of the tool."""
 
@@ -68,6 +74,31 @@ def is_cutting(now: Any, known: Any, products: Records, settings: Any) -> bool:
     heard = known.clearness > _HEARD
     most = known.cutting + _SURE * known.cutting_error
     return bool(heard and not most < _NEXT_TO_NOTHING * settings.tool_stiffness)
+
+
+@compiled(borrows=True, inner=True)
+def weigh_vibration(now: Any, newest: Any, settings: Any) -> None:
+    """Whether the tool vibrates by so much more than it is pushed aside that it may leave the cut.
+
+    Then the cut may chatter since before anybody listened, at full size and never the same, so
+    that nothing rises and nothing is steady.
+
+    Args:
+        now: Of the state, changed in place.
+        newest: Sums of the newest hop.
+        settings: A record of `signal_conditioning.SETTINGS`.
+    """
+    share = max(settings.period / _MEAN_TIME, 1.0 / now.hops_seen)
+    if now.hops_seen == 1:
+        now.mean_place = now.mean_power = 0.0
+    now.mean_place += share * (newest.tool_mean - now.mean_place)
+    now.mean_power += share * (newest.change_power - now.mean_power)
+    change, place = math.sqrt(now.mean_power), abs(now.mean_place)
+    now.out_of_proportion = max(now.out_of_proportion - 1, 0)
+    if change <= _PROPORTION * place or settings.has_angle == 0:  # then the mean is filtered away
+        now.out_of_proportion = 0
+    elif change < place / _NO_MEAN and now.hops_seen >= _KNOWN:
+        now.out_of_proportion = int(_STAYS / settings.period)
 
 
 @compiled(borrows=True, inner=True)
@@ -151,4 +182,4 @@ def write_figures(
     now.omega = known.angular_frequency
     if model:
         now.cutting, now.cutting_error = known.cutting, known.cutting_error
-        now.stiffness = known.stiffness
+        now.stiffness, now.stiffness_error = known.stiffness, known.stiffness_error

@@ -33,12 +33,12 @@ what is free of its mean hold, samples since an output."""
 HOP_SUMS = record_type(
     """
     force_force force_chip chip_chip pull_pull pull_workpiece workpiece_workpiece tool_power
-    free_power outputs tool_noise workpiece_noise tool_mean
+    free_power outputs tool_noise workpiece_noise tool_mean change_power
     """
 )
 """Sums over the outputs of one hop: force F, chip h, the changes u of workpiece and tool over a
 turn, pull F - m x'' - c x' = k x; the tool free of its mean at every spindle angle; third
-differences of the raw samples; mean of the tool."""
+differences of the raw samples; mean of the tool; mean square of the chip's change over a turn."""
 
 PHASES = 8
 """Spindle angles at which a value is taken once a turn."""
@@ -225,7 +225,7 @@ def clear(sums: Any) -> None:
     sums.force_force = sums.force_chip = sums.chip_chip = 0.0
     sums.pull_pull = sums.pull_workpiece = sums.workpiece_workpiece = 0.0
     sums.tool_power = sums.free_power = sums.outputs = sums.tool_mean = 0.0
-    sums.tool_noise = sums.workpiece_noise = 0.0
+    sums.tool_noise = sums.workpiece_noise = sums.change_power = 0.0
 
 
 @compiled(borrows=True, inner=True)
@@ -285,6 +285,7 @@ def follow(block: Array, settings: Any, kernels: Kernels, memory: Memory, produc
             _take_phase(history, n, memory.phases)
         if not _take_changes(history, counts, settings):
             continue
+        products.change_power += history[CHIP, n] ** 2 * thinning / block.shape[0]
         for j in range(memory.resonators.size):
             memory.resonators[j] = kernels.poles[j] * memory.resonators[j] + history[CHIP, n]
         counts.since_output += 1

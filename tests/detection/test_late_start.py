@@ -11,6 +11,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine, Mode
+from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import rightmost_root
 
@@ -77,3 +78,22 @@ def test_a_stable_cut_is_called_so_within_two_seconds(
     seen = _states(machine, _cut_for_long(machine, rpm, depth, noise), told)
     assert next(time for time, state in seen if state == 'stable') < 2.0
     assert {state for time, state in seen if time > 2.0} <= {'stable', 'watch'}
+
+
+@pytest.mark.parametrize('told', [True, False])
+@pytest.mark.parametrize(
+    ('depth', 'noise', 'is_chatter'),
+    [(1.2e-3, 0.05, True), (2e-3, 0.05, True), (0.2e-3, 0.05, False), (0.3e-3, 0.5, False)],
+)
+def test_chatter_that_never_repeats_itself_is_not_called_stable(
+    depth: float, noise: float, is_chatter: bool, told: bool
+) -> None:
+    """Far beyond the limit, 0.326 mm, of a machine of several modes, where nothing is steady."""
+    described = load_machine('chucked_shaft')
+    cut = described.cut.with_changes(depth_of_cut=depth, force_noise=noise)
+    lathe = VirtualLathe(described.machine, cut=cut)
+    lathe.advance(100_000)
+    detector = ChatterDetector(described.machine if told else None)
+    seen = {detector.update(lathe.advance(_BATCH), lathe.columns).state for _ in range(800)}
+    assert ('stable' in seen) is not is_chatter
+    assert 'idle' not in seen
