@@ -13,6 +13,10 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+_NOT_KNOWN = '_NODE_NAME_UNKNOWN_'
+"""What the middleware of ROS 2 calls a node that it has not heard of yet."""
 
 
 def publisher_names(node: Node, topic: str) -> list[str]:
@@ -23,7 +27,14 @@ def publisher_names(node: Node, topic: str) -> list[str]:
         topic: As the node names it; remapped where it is.
     """
     offers = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
-    return sorted(f'{offer.node_namespace.rstrip("/")}/{offer.node_name}' for offer in offers)
+    return sorted(map(full_name, offers))
+
+
+def full_name(offer: TopicEndpointInfo) -> str:
+    """Of the node that publishes; DDS may tell of a publisher before it tells of its node."""
+    if offer.node_name == _NOT_KNOWN:
+        return 'a node of unknown name'
+    return f'{offer.node_namespace.rstrip("/")}/{offer.node_name}'
 
 
 def several_publish(names: Sequence[str], topic: str) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64MultiArray
 from support.node_bench import LATCHED, Bench
@@ -148,10 +147,12 @@ def cured(shop: Shop) -> None:
 
 def two_publishers(shop: Shop) -> None:
     node = shop.monitor()
-    others = [Node(f'lathe_{k}', context=shop.bench.node.context) for k in 'ab']
+    others = [shop.bench.another(f'lathe_{k}') for k in 'ab']
     talkers = [n.create_publisher(Float64MultiArray, '/lathe/samples', 100) for n in others]
     for talker in talkers:
         shop.bench.spin_until(talker.get_subscription_count, 'the monitor')
+    expected = ['/lathe_a', '/lathe_b']
+    shop.bench.spin_until(lambda: node._subscription.publishers() == expected, 'their names')
     samples = [chatters(1.0), shifted(chatters(1.0), 500.0)]
     for k in range(0, 10_000, BLOCK):
         for talker, each in zip(talkers, samples, strict=True):
@@ -162,11 +163,11 @@ def two_publishers(shop: Shop) -> None:
     assert entry.msg.startswith('/lathe_a and /lathe_b publish')
     assert node._continuity.lost == 0
     assert len(shop.said()) < 10
-    others[1].destroy_node()
+    shop.bench.let_go(others[1])
     shop.bench.spin_until(lambda: len(node._subscription.publishers()) == 1, 'one publisher')
     shop.send(talkers[0], shifted(samples[0], 1.0))
     shop.bench.spin_until(lambda: not node._senders, 'the end of the mixture')
-    others[0].destroy_node()
+    shop.bench.let_go(others[0])
 
 
 def best_effort(shop: Shop) -> None:

@@ -8,13 +8,14 @@ import pytest
 from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 
 from lathe_chatter.nodes.node_main import make_executor
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import PAGE
-from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.nodes.polled_subscription import PolledSubscription, full_name
 
 PATIENCE = 60.0
 
@@ -51,3 +52,17 @@ def test_messages_wait_until_they_are_asked_for(context: Context, make: object) 
         executor.remove_node(node)
         executor.shutdown()
         node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('namespace', 'name', 'expected'),
+    [
+        ('/', 'lathe', '/lathe'),
+        ('/cell', 'lathe', '/cell/lathe'),
+        ('_NODE_NAMESPACE_UNKNOWN_', '_NODE_NAME_UNKNOWN_', 'a node of unknown name'),
+    ],
+)
+def test_a_publisher_has_the_name_of_its_node_or_is_said_to_be_unknown(
+    namespace: str, name: str, expected: str
+) -> None:
+    assert full_name(TopicEndpointInfo(node_namespace=namespace, node_name=name)) == expected

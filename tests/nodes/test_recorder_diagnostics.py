@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray
 from support.node_bench import LATCHED, Bench
@@ -63,7 +62,7 @@ def test_two_lathes_on_one_topic_are_named_and_nothing_of_them_counts_as_lost(
     shop: Shop, spin_until: Any
 ) -> None:
     recorder = shop.recorder('lathe/samples')
-    others = [Node(f'lathe_{k}', context=shop.bench.node.context) for k in 'ab']
+    others = [shop.bench.another(f'lathe_{k}') for k in 'ab']
     talkers = [node.create_publisher(Float64MultiArray, SAMPLES, KEPT) for node in others]
     for talker in talkers:
         spin_until(talker.get_subscription_count, 'the recorder')
@@ -92,8 +91,6 @@ def test_two_lathes_on_one_topic_are_named_and_nothing_of_them_counts_as_lost(
     assert counted['complaint'] == expected
     (finding,) = [each for each in verify(shop.folder).findings if each.loss]
     assert f'{SAMPLES}: samples of several publishers are mixed' in finding.text
-    for node in others:
-        node.destroy_node()
 
 
 def test_a_topic_that_was_asked_for_and_that_nobody_publishes_is_told(

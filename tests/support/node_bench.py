@@ -31,6 +31,17 @@ class Bench:
         self._clients: dict[str, Any] = {}
         executor.add_node(self.node)
 
+    def another(self, name: str) -> Node:
+        """Somebody else's node, which goes with the test, however that ends."""
+        node = Node(name, context=self.node.context)
+        self.executor.add_node(node)
+        return node
+
+    def let_go(self, node: Node) -> None:
+        """End somebody else's node before the test ends."""
+        self.executor.remove_node(node)
+        node.destroy_node()
+
     def listen(self, kind: Any, topic: str, qos: QoSProfile = DEEP) -> list[Any]:
         """The messages of a topic, as they come; returns once its publisher is found."""
         messages: list[Any] = []
