@@ -21,6 +21,7 @@ from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameter_tables import MONITOR, SUPERVISOR, ModelSource
+from lathe_chatter.nodes.shared_memory import remove_half_made_ports
 from lathe_chatter.page.server import answers, free_port, open_in_browser
 from lathe_chatter.scenario import Scenario
 
@@ -88,6 +89,8 @@ def play(
     SUPERVISOR.complete(_supervisor_of(scenario))
     if logs := ensure_log_folder():
         screen.say(logs)
+    for sentence in remove_half_made_ports():
+        screen.say(sentence)
     try:
         with _free_domain(screen), DeferredSignals() as held:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
