@@ -30,8 +30,11 @@ from lathe_chatter.errors import WorkerError
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
-_AHEAD, _PER_WORKER = 2, 8
-"""Batches that are out at once, and batches in all, for each worker."""
+_AHEAD = 2
+"""Batches that are out at once for each worker."""
+_PER_WORKER, _PER_WORKER_HERE = 8, 32
+"""Batches in all for each worker: fewer where each costs its way to another machine, more where
+workers that are done would wait for the last."""
 RETRIES = 3
 
 
@@ -71,7 +74,9 @@ def spread(
 
 def batches_of(items: Sequence[Item], executor: Executor | None) -> list[Sequence[Item]]:
     """Items as they go out together, as a task costs some milliseconds on other machines."""
-    size = max(1, math.ceil(len(items) / (_PER_WORKER * width_of(executor))))
+    here = executor is None or isinstance(executor, (futures.ThreadPoolExecutor, Processes))
+    count = (_PER_WORKER_HERE if here else _PER_WORKER) * width_of(executor)
+    size = max(1, math.ceil(len(items) / count))
     return [items[k : k + size] for k in range(0, len(items), size)]
 
 

@@ -144,10 +144,10 @@ def test_where_processors_differ_that_is_said(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_lost_worker_loses_little() -> None:
-    """What it had in hand is an eighth of its share, in whatever number of items."""
+    """What it had in hand is a 32nd of its share, in whatever number of items."""
     with ThreadPoolExecutor(2) as pool:
         batches = batches_of(range(1600), pool)
-    assert max(map(len, batches)) == 100
+    assert max(map(len, batches)) == 25
     assert [item for batch in batches for item in batch] == list(range(1600))
 
 

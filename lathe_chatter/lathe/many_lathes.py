@@ -11,7 +11,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.executors import spread
+from lathe_chatter.executors import batches_of, run_batches
 from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut
@@ -84,10 +84,17 @@ class LatheSweep:
         wanted = [SAMPLE_COLUMNS.index(name) for name in columns]
         cut_on = partial(_cut_on, samples=samples, wanted=wanted)
         out = np.empty((len(self), samples, len(wanted)))
-        for place, after in enumerate(spread(cut_on, self._lathes, executor=executor)):
+        ends: dict[int, tuple[LatheState, Array]] = {}
+        batches = batches_of(self._lathes, executor)
+        # What has come is put in its place while the others still cut.
+        for done in run_batches(cut_on, batches, executor=executor):
+            first = done.place * len(batches[0])
+            for place, after in enumerate(done.results, first):
+                ends[place], out[place] = (after.state, after.last), after.samples
+        for place, (state, last) in ends.items():
             lathe = self._lathes[place].lathe
-            lathe.restore(after.state)
-            self._lathes[place], out[place] = _Lathe(lathe, after.last), after.samples
+            lathe.restore(state)
+            self._lathes[place] = _Lathe(lathe, last)
         return out.transpose(1, 0, 2)
 
     def lathes(self) -> list[VirtualLathe]:
@@ -132,7 +139,8 @@ def _cut_on(one: _Lathe, samples: int, wanted: list[int]) -> _After:
     out = np.empty((samples, len(wanted)))
     while done < samples and not lathe.guard:
         block = lathe.advance(min(_BLOCK, samples - done))
-        out[done : done + len(block)] = block[:, wanted]
+        for place, column in enumerate(wanted):
+            out[done : done + len(block), place] = block[:, column]
         done += len(block)
         if len(block):
             last = block[-1].copy()
