@@ -7,7 +7,7 @@ import itertools
 import json
 import shutil
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from contextlib import closing, nullcontext
 from functools import partial
@@ -33,10 +33,7 @@ ENDINGS = {Form.PARQUET: '.parquet', Form.HDF5: '.h5', Form.ZARR: '.zarr', Form.
 Files = dict[str, bytes]
 """What a part consists of, by path in its folder; a part that is one file is `.`."""
 MANIFEST, CARD = 'manifest.jsonl', 'README.md'
-_ENTRY = {
-    *('part', 'windows', 'stable', 'too_fast', 'ended_early', 'windows_sha256', 'files'),
-    *('machines', 'processor'),
-}
+_ENTRY = 'part windows stable too_fast ended_early windows_sha256 files machines processor'
 """What a line of the manifest says of a part."""
 _PART_SIZE = 8e6
 """Bytes of a part, where one machine has not more: some seconds of work, and little to lose."""
@@ -44,8 +41,8 @@ _PART_SIZE = 8e6
 
 def parts_of(plan: Plan) -> dict[str, range]:
     """The machines of each part by its path, of one split each: always the same."""
-    size = 4 * len(plan.columns) * len(plan.starts) * plan.length
-    size = 80 * plan.samples if plan.form is Form.MCAP else size
+    windows = 4 * len(plan.columns) * len(plan.starts) * plan.length
+    size = 80 * plan.samples if plan.form is Form.MCAP else windows
     step = max(1, round(_PART_SIZE / (plan.runs * size)))
     return {
         f'{split}/part-{number:05}{ENDINGS[plan.form]}': machines[first : first + step]
@@ -117,8 +114,7 @@ def make_dataset(
         facts = {'plan': plan, 'header': header, 'parts': entries}
         card = rendered('dataset/card.md.j2', **facts, unit_of=unit_of, table=LATHE)
         (folder / CARD).write_text(card, encoding='utf-8')
-        in_order = [json.dumps(line) + '\n' for line in (header, *entries)]
-        _write(manifest, {'.': ''.join(in_order).encode()})
+        _write(manifest, {'.': _lines([header, *entries])})
     except OSError as error:
         said = f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there'
         raise DatasetError(f'{said} is whole, and the same call goes on from it.') from None
@@ -126,20 +122,21 @@ def make_dataset(
 
 
 def _known_part(entry: dict[str, Any]) -> dict[str, Any]:
-    """A line of the manifest.
-
-    Raises:
-        ValueError: If it is another.
-    """
-    if entry.keys() != _ENTRY:
+    """A line of the manifest; a ValueError if it is another."""
+    if ' '.join(entry) != _ENTRY:
         raise ValueError(entry)
     return entry
 
 
 def _is_there(folder: Path, entry: dict[str, Any]) -> bool:
     """Whether each file of a part has the size that it was written with."""
-    sizes = {folder / entry['part'] / n: size for n, (size, _) in entry['files'].items()}
-    return all(file.is_file() and file.stat().st_size == size for file, size in sizes.items())
+    files = ((folder / entry['part'] / name, size) for name, (size, _) in entry['files'].items())
+    return all(file.is_file() and file.stat().st_size == size for file, size in files)
+
+
+def _lines(values: Iterable[dict[str, Any]]) -> bytes:
+    """JSON, a line each."""
+    return ''.join(f'{json.dumps(value)}\n' for value in values).encode()
 
 
 def _write(path: Path, files: Files) -> None:
@@ -161,10 +158,10 @@ def read_windows(folder: Path | str, split: str | None = None) -> Table:
     Raises:
         DatasetError: If there are none.
     """
-    found = sorted(Path(folder).glob(f'{split or "*"}/part-*.*'))
-    if not found:
+    found = map(_read_part, sorted(Path(folder).glob(f'{split or "*"}/part-*.*')))
+    tables = [table for table in found if len(table['machine'])]
+    if not tables:
         raise DatasetError(f'{folder} holds no windows{f" of {split}" if split else ""}.')
-    tables = [_read_part(path) for path in found]
     return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
 
 
@@ -175,17 +172,16 @@ def _files_of(plan: Plan, table: Table, runs: list[DrawnRun]) -> Files:
         MissingPackageError: If a library is missing that the form needs.
     """
     with TemporaryDirectory() as name:
-        part = Path(name) / 'part'
+        part = Path(name) / f'part{ENDINGS[plan.form]}'
         if plan.form is Form.PARQUET:
             _write_parquet(part, table)
         elif plan.form is Form.MCAP:
             _write_runs(part, table, runs, plan.duration)
         else:
-            with warnings.catch_warnings(), _arrays(part, plan.form, 'w') as arrays:
+            with warnings.catch_warnings(), _arrays(part, 'w') as arrays:
                 warnings.simplefilter('ignore')  # Zarr 3 has not settled on bytes yet
                 for column, values in table.items():  # words as bytes, as both hold them
                     arrays[column] = values.astype('S') if values.dtype.kind == 'U' else values
-                for column in table:
                     arrays[column].attrs['units'] = unit_of(column)
         files = [part] if part.is_file() else sorted(f for f in part.rglob('*') if f.is_file())
         return {file.relative_to(part).as_posix(): file.read_bytes() for file in files}
@@ -213,39 +209,32 @@ def _write_runs(folder: Path, table: Table, runs: list[DrawnRun], duration: floa
     from lathe_chatter.scenario.simulation import simulate
 
     for run in runs:
-        rate, steps = run.config.setup.sample_rate, list[Step]()
-        for (_, before), (sample, after) in itertools.pairwise(run.cuts.items()):
-            new = dict(vars(after).items() - vars(before).items())
-            steps.append(Step(new, at=sample / rate))
+        rate = run.config.setup.sample_rate
+        steps = [
+            Step(dict(vars(after).items() - vars(before).items()), at=sample / rate)
+            for (_, before), (sample, after) in itertools.pairwise(run.cuts.items())
+        ]
         name = f'machine_{run.machine:06}_run_{run.number:04}'
         scenario = Scenario(name, name, duration, run.config.parameters(), tuple(steps))
         knocks = [Knock(sample / rate, impulse) for sample, impulse in run.knocks.items()]
         simulate(scenario, folder / name, knocks=knocks, monitor=False)
     facts = {name: values.tolist() for name, values in table.items() if values.ndim == 1}
     rows = (dict(zip(facts, row, strict=True)) for row in zip(*facts.values(), strict=True))
-    lines = [json.dumps(row) + '\n' for row in rows]
-    (folder / 'truth.jsonl').write_text(''.join(lines), encoding='utf-8')
+    _write(folder / 'truth.jsonl', {'.': _lines(rows)})
 
 
 def _read_part(path: Path) -> Table:
     """The windows of a part in Parquet, HDF5 or Zarr."""
     if path.suffix == ENDINGS[Form.PARQUET]:
-        table = optional('pyarrow.parquet', 'Parquet').read_table(path)
-        columns = {name: table[name].combine_chunks() for name in table.column_names}
-        return {
-            name: column.flatten().to_numpy().reshape(len(column), -1)
-            if hasattr(column.type, 'list_size')
-            else column.to_numpy(zero_copy_only=False)
-            for name, column in columns.items()
-        }
-    form = Form.ZARR if path.suffix == ENDINGS[Form.ZARR] else Form.HDF5
-    with _arrays(path, form, 'r') as arrays:
+        rows = optional('pyarrow.parquet', 'Parquet').read_table(path)
+        return {name: np.array([*rows[name].to_numpy()]) for name in rows.column_names}
+    with _arrays(path, 'r') as arrays:
         table = {name: arrays[name][...] for name in arrays}
     return {n: v.astype('U') if v.dtype.kind == 'S' else v for n, v in table.items()}
 
 
-def _arrays(path: Path, form: Form, mode: str) -> Any:
+def _arrays(path: Path, mode: str) -> Any:
     """The arrays of HDF5 or Zarr by name, which are read and written alike."""
-    if form is Form.ZARR:
+    if path.suffix == ENDINGS[Form.ZARR]:
         return nullcontext(optional('zarr', 'Zarr').open_group(str(path), mode=mode))
     return optional('h5py', 'HDF5').File(path, mode)

@@ -296,9 +296,7 @@ def _distribution(
             raise inner.refused(f'{kind} must be two numbers, {meaning}', given)
         if kind != NORMAL and not values[0] < values[1]:
             low, high = map(text_of, given.value)
-            raise inner.refused(
-                f'{kind}: the lowest, {low}, must be below the highest, {high}', given
-            )
+            raise inner.refused(f'{kind}: the lowest, {low}, must be below {high}', given)
         if kind == LOG_UNIFORM and values[0] <= 0.0:
             raise inner.refused('log_uniform must begin above 0', given)
     return Distribution(kind, values, limits, of_limit)

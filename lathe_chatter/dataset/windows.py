@@ -21,8 +21,7 @@ from lathe_chatter.stability.stability_of_many_cuts import OperatingPoints, oper
 
 Table = dict[str, Array]
 """Columns of windows: (n,), and (n, samples) where they are signals."""
-_TRUTH = {'start': 's', 'growth_rate': '1/s', 'frequency': 'Hz', 'seconds_since_onset': 's'}
-_UNITS = UNITS | _TRUTH
+_UNIT = UNITS | {'start': 's', 'growth_rate': '1/s', 'frequency': 'Hz', 'seconds_since_onset': 's'}
 _REGIMES = np.array(['free', 'rattling', 'seated'])
 _ON_BEARING = {EventKind.BEARING_ENGAGES: True, EventKind.BEARING_RELEASES: False}
 _OUT_OF_CUT = {EventKind.TOOL_LEAVES_CUT: True, EventKind.TOOL_ENTERS_CUT: False}
@@ -33,7 +32,7 @@ _OF_MACHINE, _OF_RUN = 0, 1
 
 def unit_of(column: str) -> str:
     """The unit of a column of windows; empty for a pure number or a word."""
-    return _UNITS.get(column, LATHE[column].unit if column in LATHE else '')
+    return _UNIT.get(column, LATHE[column].unit if column in LATHE else '')
 
 
 @dataclass(frozen=True)
@@ -96,8 +95,7 @@ def _changed(config: LatheConfig, cut: Cut, changes: Drawn, rng: np.random.Gener
 
 def windows_of(plan: Plan, machines: dict[int, LatheConfig]) -> tuple[Table, list[DrawnRun]]:
     """The windows of some machines, and the runs that they are cut from."""
-    numbers = itertools.product(machines.items(), range(plan.runs))
-    runs = [drawn_run(plan, *machine, number) for machine, number in numbers]
+    runs = [drawn_run(plan, *one, k) for one in machines.items() for k in range(plan.runs)]
     setups = [run.config.setup for run in runs for _ in run.cuts]
     cuts = [cut for run in runs for cut in run.cuts.values()]
     leaves = [setup.tool_leaves_cut for setup in setups]
@@ -156,11 +154,10 @@ def _simulated(plan: Plan, run: DrawnRun) -> tuple[Table, Array]:
         lathe.retune(run.cuts.get(here, lathe.cut))
         if here in run.knocks:
             lathe.knock(run.knocks[here])
-        now = [lathe.bearing_engaged, not lathe.tool_in_cut]
-        contacts.append((lathe.time, *now))
+        contacts.append((lathe.time, lathe.bearing_engaged, not lathe.tool_in_cut))
         blocks.append(lathe.advance(stop - here))
         for time, kind in lathe.events:
-            now = [_ON_BEARING.get(kind, now[0]), _OUT_OF_CUT.get(kind, now[1])]
-            contacts.append((time, *now))
+            _, bears, out = contacts[-1]
+            contacts.append((time, _ON_BEARING.get(kind, bears), _OUT_OF_CUT.get(kind, out)))
     samples = dict(zip(lathe.columns, np.concatenate(blocks).T, strict=True))
     return samples, np.array([*contacts, (plan.duration + 1.0, False, False)])
