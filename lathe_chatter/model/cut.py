@@ -14,7 +14,10 @@ from lathe_chatter.model.quantity_fields import check_choice, check_fields, quan
 
 
 class BearingContact(str, Enum):
-    """How the bearing clearance enters the model; docs/explanation/model.md has the paper's."""
+    """None: no bearing; gap: beyond its clearance; seated: always on it; both_sides: on either.
+
+    docs/explanation/model.md has the paper's equations.
+    """
 
     NONE = 'none'
     """No bearing clearance in the model, equations (1)-(7)."""
@@ -42,7 +45,7 @@ class Cut:
     bearing_contact: BearingContact = BearingContact.GAP
     feed_speed: float = quantity('feed speed', 'm/s', default=0.0025, high=0.1)
     feed_per_revolution: float = quantity(
-        'feed per revolution that the feed speed follows the spindle by; 0: feed_speed rules',
+        'feed per revolution, with which the feed follows the spindle; 0: the feed speed holds',
         'm/rev',
         default=0.0,
         high=0.01,

@@ -11,11 +11,6 @@ const SHOP = {
   force_noise: ['N/√Hz', 1, 1], cutting_force_noise: ['N/√Hz', 1, 1], acceleration_noise: ['m/s²', 1, 10],
   speed_variation_amplitude: ['%', 100, 50], speed_variation_frequency: ['Hz', 1, 10], unbalance: ['g mm', 1e6, 5000],
 };
-// What the table of parameters says in names.
-const HELP = {
-  feed_per_revolution: 'with it the feed follows the spindle; 0: the feed speed holds',
-  bearing_contact: 'none: no bearing; seated: always on it; gap: once the clearance is used up; both sides: on either side of it',
-};
 const PRIMARY = ['spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'bearing_contact', 'feed_speed', 'feed_per_revolution'];
 
 let socket = null, retries = 0, asked = 0, frames = 0;
@@ -423,7 +418,7 @@ function makeControl(row) {
   line.className = 'row';
   const help = document.createElement('small'), refusal = document.createElement('span');
   help.id = `${id}-help`;
-  const meaning = HELP[row.name] ?? row.meaning;
+  const meaning = row.meaning;
   help.textContent = meaning.replace(/ \w+$/, '') === worded(row.name) || meaning === worded(row.name) ? '' : meaning;
   refusal.className = 'refusal';
   refusal.setAttribute('role', 'alert');
