@@ -31,7 +31,7 @@ from lathe_chatter.nodes.end_signals import (
 )
 from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.real_time_loop import LOOK_UP
-from lathe_chatter.nodes.shared_memory import remove_half_made_ports
+from lathe_chatter.nodes.shared_memory import free_ports
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor
@@ -117,7 +117,7 @@ def run_node(
         _refuse_words(args, usage or _usage(members))
         if logs := ensure_log_folder():
             sys.stderr.write(f'{logs}\n')
-        missed += remove_half_made_ports()
+        missed += free_ports()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         for sentence in missed:
             get_logger(next(iter(members))).warning(sentence)

@@ -21,7 +21,7 @@ from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
 from lathe_chatter.nodes.parameter_tables import MONITOR, SUPERVISOR, ModelSource
-from lathe_chatter.nodes.shared_memory import remove_half_made_ports
+from lathe_chatter.nodes.shared_memory import free_ports
 from lathe_chatter.page.server import answers, free_port, open_in_browser
 from lathe_chatter.scenario import Scenario
 
@@ -89,7 +89,7 @@ def play(
     SUPERVISOR.complete(_supervisor_of(scenario))
     if logs := ensure_log_folder():
         screen.say(logs)
-    for sentence in remove_half_made_ports():
+    for sentence in free_ports():
         screen.say(sentence)
     try:
         with _free_domain(screen), DeferredSignals() as held:

@@ -10,7 +10,7 @@ from std_msgs.msg import Float64MultiArray
 from support.node_bench import Bench
 from support.node_processes import NodeProcesses
 
-from lathe_chatter.nodes.shared_memory import SHARED_MEMORY, remove_half_made_ports
+from lathe_chatter.nodes.shared_memory import SHARED_MEMORY, free_ports
 
 KINDS = ('fastrtps', 'fastdds')
 READY = (2).to_bytes(4, 'little') + bytes(100)
@@ -20,12 +20,20 @@ READY = (2).to_bytes(4, 'little') + bytes(100)
 @pytest.mark.parametrize('name', ['fastrtps_port7400', 'fastdds_port7411'])
 def test_a_half_made_port_is_removed(name: str, content: bytes, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(content)
-    (sentence,) = remove_half_made_ports(tmp_path)
+    (sentence,) = free_ports(tmp_path)
     assert sentence.startswith(
         f'{tmp_path / name} was left half-made by a process that was killed;'
     )
     assert not (tmp_path / name).exists()
-    assert remove_half_made_ports(tmp_path) == []
+    assert free_ports(tmp_path) == []
+
+
+def test_a_semaphore_that_a_killed_process_had_is_removed(tmp_path: Path) -> None:
+    semaphore = tmp_path / 'sem.fastrtps_port7413_mutex'
+    semaphore.write_bytes(bytes(32))
+    (sentence,) = free_ports(tmp_path)
+    assert sentence.startswith(f'{semaphore} was left locked by a process')
+    assert not semaphore.exists()
 
 
 def test_a_port_that_somebody_is_making_stays(tmp_path: Path) -> None:
@@ -33,16 +41,17 @@ def test_a_port_that_somebody_is_making_stays(tmp_path: Path) -> None:
     port.touch()
     maker = threading.Timer(0.5, port.write_bytes, [READY])
     maker.start()
-    assert remove_half_made_ports(tmp_path) == []
+    assert free_ports(tmp_path) == []
     maker.join()
     assert port.read_bytes() == READY
 
 
 def test_what_is_ready_or_no_port_stays(tmp_path: Path) -> None:
-    files = {'fastrtps_port7400': READY, 'fastrtps_port7411_el': b'', 'fastdds_0123_port': b''}
+    files = {'sem.fastdds_port7413_mutex': (1).to_bytes(32, 'little'), 'sem.other': bytes(32)}
+    files |= {'fastrtps_port7400': READY, 'fastrtps_port7411_el': b'', 'fastdds_0123_port': b''}
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
-    assert remove_half_made_ports(tmp_path) == []
+    assert free_ports(tmp_path) == []
     assert {path.name for path in tmp_path.iterdir()} == set(files)
 
 
