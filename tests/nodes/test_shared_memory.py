@@ -68,7 +68,8 @@ def test_a_lathe_starts_where_another_was_killed_amid_its_start(
         nodes.start('lathe')
         samples = bench.listen(Float64MultiArray, '/lathe/samples')
         bench.spin_until(lambda: samples, 'samples')
-        assert 'left half-made' in nodes.said()
+        # By this lathe, or by a node of another test that started in these seconds.
+        assert not [path for path in made if path.exists() and not path.stat().st_size]
     finally:
         for path in made:
             if path.exists() and path.stat().st_size == 0:
