@@ -38,6 +38,8 @@ _NYQUIST = 0.5
 _LOOK = 0.05
 """s from one look for a line above all others to the next."""
 _TURN = 2.0 * math.pi
+_HEEDED = 0.3
+"""Part of the amplitude in the loudest band from which on a band may have chatter as well."""
 _SURE_SIGN = 2.0
 """Standard errors from which on growth that is read from the vibration, or a contact, is sure."""
 _CONTACT_ERRORS, _IN_PART = 8.0, 0.1
@@ -272,8 +274,12 @@ class ChatterDetector:
     def _most_serious(self) -> int:
         weights = [judge.weight for judge in self._judges]
         serious, loudest = max(weights), max(weights, key=lambda weight: weight[1])
-        # A quick band knows soon that it is stable; what is loud elsewhere may yet be chatter.
-        self._known = self._known or loudest[0] > SERIOUSNESS[UNKNOWN]
+        # A quick band knows soon that it is stable; what is loud elsewhere may yet be chatter, at
+        # the start as in a ramp that is none for hops so short.
+        both = zip(weights, self._judges, strict=True)
+        unjudged = max((weight[1] for weight, judge in both if judge.ramps), default=0.0)
+        known = self._known or loudest[0] > SERIOUSNESS[UNKNOWN]
+        self._known = known and not unjudged > _HEEDED * loudest[1]
         speaks = self._known or serious[0] > SERIOUSNESS[STABLE]
         return weights.index(serious if speaks else loudest)
 
@@ -294,10 +300,13 @@ class ChatterDetector:
 
     def _surely(self, state: int) -> int:
         """The state, which is unknown where `stable` may be said of chatter at its full size."""
-        if state != STABLE or self._mixed:
+        if state != STABLE:
             return state
+        if len(self._judges) > 1 and not self._known:
+            return UNKNOWN
         lacking = (judge.state.now[0] for judge in self._judges if not judge.believed)
-        return UNKNOWN if any(now['out_of_proportion'] for now in lacking) else state
+        out = not self._mixed and any(now['out_of_proportion'] for now in lacking)
+        return UNKNOWN if out else state
 
     def _new_estimate(self, time: float) -> Estimate:
         judge = self._judges[self._speaker]

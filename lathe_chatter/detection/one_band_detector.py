@@ -181,6 +181,11 @@ class BandDetector:
         loudness = amplitude if math.isfinite(amplitude) else 0.0
         return SERIOUSNESS[int(self._now['state'])], loudness
 
+    @property
+    def ramps(self) -> bool:
+        """Whether the speed changes so much from hop to hop that nothing is judged."""
+        return bool(self._now['ramping'])
+
     def line_known(self, place: int) -> bool:
         """Whether the mean power of a resonator is one of long enough."""
         return bool(self._now.hops_seen * self.state.line_shares[place] > 1.0)
