@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import resource
 import sys
@@ -89,17 +90,29 @@ def bench(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUn
 
 
 @pytest.fixture
-def start(context: Context, executor: SingleThreadedExecutor) -> Callable[..., Any]:
-    """Start a node of a class with parameters given as for `-p`, spun by the test."""
+def start(context: Context, executor: SingleThreadedExecutor) -> Iterator[Callable[..., Any]]:
+    """Start a node of a class with parameters given as for `-p`, spun by the test.
+
+    A node that was refused goes with its test: collected later, it would take the log of the next
+    one of its name off /rosout.
+    """
+    refused = False
 
     def make(kind: Callable[..., Any], namespace: str = '', **values: Any) -> Any:
+        nonlocal refused
         overrides = [Parameter(name, value=value) for name, value in values.items()]
-        node = kind(context=context, namespace=namespace, parameter_overrides=overrides)
+        try:
+            node = kind(context=context, namespace=namespace, parameter_overrides=overrides)
+        except Exception:
+            refused = True
+            raise
         executor.add_node(node)
         node.begin()
         return node
 
-    return make
+    yield make
+    if refused:
+        gc.collect()
 
 
 @pytest.fixture(scope='session')
