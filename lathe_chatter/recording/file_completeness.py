@@ -96,7 +96,7 @@ def lost_at_the_end(
         name = names.get(channel, '')
         lost = count - messages.get(name, 0)
         if lost > 0 and name in last:
-            span = f'the last {(when - last[name]) / 1e9:.3f} s'
+            span = f'in the last {(when - last[name]) / 1e9:.3f} s'
             found.append(f'{name}: {lost} messages that had come are not there, {span}.')
         elif lost > 0:
             named = name or 'a topic that is not there either'

@@ -34,8 +34,8 @@ PUBLISHERS = 'lathe_chatter/publishers'
 """Name of the record of how many publishers a topic had, one after another too, as JSON; of one
 that had several, for where it is not told a topic had one."""
 
-STALLS = 'stalls'
-"""Among these, how often the recorder took too long to take what had come."""
+STALLS, LONGEST_STALL = 'stalls', 'longest_stall'
+"""Among these, how often the recorder took too long to take what had come; and at most, s."""
 
 PAUSES = 'lathe_chatter/pauses'
 """Name of the record of what the recorder left out in pauses, as JSON: by topic of samples the

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lathe_chatter.recording.provenance import STALLS
+from lathe_chatter.recording.provenance import LONGEST_STALL, STALLS
 
 _STALL = 0.1
 """s between two times that messages are taken which count as a stall; usual are 0.04 s."""
@@ -32,4 +32,4 @@ class ReceiveStalls:
 
     def values(self) -> dict[str, str]:
         """What a run notes of them."""
-        return {STALLS: str(self.count), 'longest_stall': f'{self.longest:g}'}
+        return {STALLS: str(self.count), LONGEST_STALL: f'{self.longest:.3g}'}

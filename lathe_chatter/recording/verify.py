@@ -21,6 +21,7 @@ from lathe_chatter.recording.file_completeness import (
 )
 from lathe_chatter.recording.metadata_yaml_check import check_metadata
 from lathe_chatter.recording.provenance import (
+    LONGEST_STALL,
     PUBLISHERS,
     RECEPTION,
     STALLS,
@@ -248,7 +249,12 @@ def _check_reception(
         for topic in note.values:
             heard = noted(note, topic)
             if topic == STALLS and heard:
-                found.remark(f'The recorder stood still {heard} times.')
+                times = 'once' if heard == 1 else f'{heard} times'
+                longest = note.values.get(LONGEST_STALL, 'an unknown number of')
+                found.remark(
+                    f'The recorder took no messages for more than 0.1 s {times}, for {longest} s '
+                    'at most; what was lost by it, if anything, is told by topic.'
+                )
             if not isinstance(heard, dict):
                 continue
             lost, there = heard.get('lost', 0), found.messages[topic]

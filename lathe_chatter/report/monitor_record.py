@@ -23,8 +23,9 @@ from lathe_chatter.recording.run_timeline import Placed
 
 DECIDED = re.compile(r'At (?P<time>\d+\.\d{6}) s: (?:(?P<up>chatter)|the chatter has died out)\b')
 """The sentences of the monitor about its flag (`nodes/monitor_sentences.py`)."""
-_TOGETHER = 100_000_000
-"""ns within which the flag and its sentence are published."""
+_BEFORE, _AFTER = 100_000_000, 5_000_000_000
+"""ns before and after a flag within which its sentence is published: the advice that this
+gives is looked for meanwhile, on a busy machine for more than a second."""
 _ROUNDING = 0.1
 """s by which a flag may be received before the samples of which it is."""
 
@@ -104,7 +105,8 @@ class MonitorRecord:
             frequency, growth_rate = (
                 value_near(estimates[name], received) for name in ('frequency', 'growth_rate')
             )
-            late = since - self._decided(each, since, up=up)
+            last = flags[-1].time - begin if flags else -math.inf
+            late = since - self._decided(each, last, since, up=up)
             flags.append(Flag(received - late, up, frequency, growth_rate, late=late))
         return flags
 
@@ -118,19 +120,22 @@ class MonitorRecord:
         since = self._cuts.timeline.simulated_time(received, session.blocks)
         return self._begins[id(session)], since
 
-    def _decided(self, found: Placed, received: float, *, up: bool) -> float:
-        """When a flag was decided in its session, s; when it was received, if nothing tells."""
+    def _decided(self, found: Placed, last: float, received: float, *, up: bool) -> float:
+        """When a flag was decided in its session, s; when it was received, if nothing tells.
+
+        Not before the `last` change of it, s.
+        """
         logger = logger_of(found.raw.topic.rsplit('/', 1)[0])
         told = [
-            (abs(each.published - found.raw.publish_time), each.time)
+            (each.published, each.time)
             for each in self._decisions
             if each is not None
             and each.logger == logger
             and each.up == up
-            and each.time <= received + _ROUNDING  # else of samples before a reset
+            and -_BEFORE <= each.published - found.raw.publish_time <= _AFTER
+            and last < each.time <= received + _ROUNDING  # else of samples before a reset
         ]
-        apart, time = min(told, default=(math.inf, math.nan))
-        return time if apart <= _TOGETHER else received
+        return min(told)[1] if told else received
 
 
 def _decision(found: Placed) -> _Decision | None:

@@ -56,8 +56,8 @@ def test_a_kill_costs_what_verify_says(tmp_path: Path) -> None:
     assert found.messages == {'/often': 50, '/seldom': 2}
     said = [finding.text for finding in found.findings if finding.loss]
     assert said == [
-        '/often: 70 messages that had come are not there, the last 0.700 s.',
-        '/seldom: 1 messages that had come are not there, the last 0.400 s.',
+        '/often: 70 messages that had come are not there, in the last 0.700 s.',
+        '/seldom: 1 messages that had come are not there, in the last 0.400 s.',
         'a topic that is not there either: none of the 1 messages that had come are there.',
         'The recorder did not finish: what came at the end is not there.',
     ]

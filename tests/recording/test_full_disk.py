@@ -86,7 +86,7 @@ def test_a_full_disk_leaves_the_commit_before(small_disk: Path) -> None:
     check(small_disk / 'run', committed)
     losses = [finding.text for finding in verify(small_disk / 'run').findings if finding.loss]
     assert losses == [
-        '/noise: 7 messages that had come are not there, the last 0.000 s.',
+        '/noise: 7 messages that had come are not there, in the last 0.000 s.',
         'The recorder did not finish: what came at the end is not there.',
     ]
 

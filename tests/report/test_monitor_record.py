@@ -53,11 +53,17 @@ def test_a_flag_has_the_time_at_which_its_monitor_decided(tmp_path: Path) -> Non
     assert flag.received == pytest.approx(0.1)
 
 
+def test_a_sentence_that_waited_for_its_advice_dates_its_flag(tmp_path: Path) -> None:
+    (flag,) = flags_of(tmp_path, ONSET, late=1_500_000_000)
+    assert flag.time == pytest.approx(0.05)
+
+
 @pytest.mark.parametrize(
     ('sentence', 'other'),
     [
         (ONSET, {'logger': 'other.chatter_monitor'}),
-        (ONSET, {'late': 1_000_000_000}),
+        (ONSET, {'late': -1_000_000_000}),
+        (ONSET, {'late': 10_000_000_000}),
         ('At 0.050000 s: the chatter has died out; the cut is stable.', {}),
         ('At 0.050000 s: try 3700 rev/min.', {}),
         ('At 5.000000 s: chatter flagged.', {}),
