@@ -209,7 +209,7 @@ class LatheNode(ParameterNode):
         bound: float = self.values['clock_catch_up']  # type: ignore[assignment]  # a double
         if self._pacer.gone_back(now):
             self.bounded_log.warning(
-                f'/clock went back by {-late:.3f} s to {now / SECOND:.3f} s: '
+                f'/clock went back to {now / SECOND:.3f} s, {-late:.3f} s before the next tick: '
                 'the cut goes on from there.',
                 'clock back',
             )

@@ -30,7 +30,8 @@ from lathe_chatter.model.machine_file import MachineDescription
 from lathe_chatter.plot_style import text_of
 from lathe_chatter.recording import Run, read_run
 from lathe_chatter.recording.clock_steps import step_sentence
-from lathe_chatter.recording.recorded_cuts import LOG, RecordedCuts, recorded_cuts
+from lathe_chatter.recording.cut_log import logger_of
+from lathe_chatter.recording.recorded_cuts import LOG, RecordedCuts, message_of, recorded_cuts
 from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.report.monitor_record import Flag, MonitorRecord
@@ -280,7 +281,7 @@ def read_history(path: Path, topic: str | None = None) -> History:
         later_sessions=tuple(later),
         known=first.known,
         described=first.described,
-        remarks=_remarks(cuts),
+        remarks=_remarks(cuts, logger_of(topic.rsplit('/', 1)[0])),
     )
 
 
@@ -321,12 +322,18 @@ def _on_one_axis(
         yield blocks._replace(signals=signals)
 
 
-def _remarks(cuts: RecordedCuts) -> list[str]:
-    """Steps of the clock, what does not fit, and lathes that left no sample."""
+def _remarks(cuts: RecordedCuts, lathe: str) -> list[str]:
+    """Steps of the clocks, what does not fit, and lathes that left no sample."""
     remarks = [
         f'At {time:.3f} s {step_sentence(seconds)}' for time, seconds in cuts.timeline.steps
     ]
     remarks += cuts.log.contradictions
+    said = [message_of(each) for each in cuts.messages if each.raw.topic == LOG]
+    remarks += [
+        f'The lathe said: {each.msg}'
+        for each in said
+        if each.name == lathe and each.msg.startswith('/clock ')
+    ]
     sampled = {id(session) for session in cuts.sampled}
     lost = [each for each in cuts.log.sessions if each.beginning and id(each) not in sampled]
     if lost:

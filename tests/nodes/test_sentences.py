@@ -23,8 +23,8 @@ STATISTICS, GROUP = 'nodes/test_lathe_diagnostics.py', 'nodes/test_node_processe
 
 SAID = {
     'lathe_node.py': {
-        '/clock went back by {} s to {} s: the cut goes on from there.': (
-            'it shows a time before that of the last tick',
+        '/clock went back to {} s, {} s before the next tick: the cut goes on from there.': (
+            'it shows a time before that of the next tick, by more than one',
             f'{CLOCK}::test_a_clock_that_goes_back_or_stands_still_is_told',
         ),
         (

@@ -53,6 +53,16 @@ def test_a_flag_has_the_time_at_which_its_monitor_decided(tmp_path: Path) -> Non
     assert flag.received == pytest.approx(0.1)
 
 
+def test_a_jump_of_the_clock_that_a_lathe_followed_is_in_the_report(tmp_path: Path) -> None:
+    said = (
+        '/clock went back to 120.009 s, 4.984 s before the next tick: the cut goes on from there.'
+    )
+    flags_of(tmp_path, said, logger='cell.lathe')
+    assert read_history(tmp_path / 'run').remarks == [f'The lathe said: {said}']
+    flags_of(tmp_path / 'other', said, logger='other.lathe')
+    assert read_history(tmp_path / 'other' / 'run').remarks == []
+
+
 def test_a_sentence_that_waited_for_its_advice_dates_its_flag(tmp_path: Path) -> None:
     (flag,) = flags_of(tmp_path, ONSET, late=1_500_000_000)
     assert flag.time == pytest.approx(0.05)
