@@ -23,7 +23,7 @@ from lathe_chatter.detection.sensors_to_displacement import sensors_among
 from lathe_chatter.detection.speed_adviser import speeds_to_recommend
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.listening import Judged, Score, judge, read_signals, score
-from lathe_chatter.listening.detector_score import read_labels
+from lathe_chatter.listening.detector_score import labels_beyond, read_labels
 from lathe_chatter.model.machine_file import load_machine
 from lathe_chatter.model.quantity_fields import Quantity
 from lathe_chatter.plot_style import files_of_picture
@@ -82,6 +82,8 @@ def run(options: Namespace) -> int:
     signals = read_signals(options.recording, columns=columns, rate=rate, topic=options.topic)
     if signals.remark:
         screen.say(signals.remark)
+    for sentence in labels_beyond(labels, signals):
+        screen.say(f'WARNING  {sentence}')
     sensors = sensors_among(signals.columns)
     if sensors is None:
         raise SignalFileError(

@@ -118,20 +118,20 @@ def read_labels(path: Path) -> list[Label]:
     """Read a CSV of rows `start,end,state`, the state as in `Estimate`; it may have that head.
 
     Raises:
-        SignalFileError: If it is none, or no state in it is one that is known.
+        SignalFileError: If it is none, a state is not known, or rows say two things of one time.
     """
-    found = []
+    found = dict[int, Label]()
     try:
         with path.open(encoding='utf-8-sig', newline='') as stream:
-            rows = [row for row in csv.reader(stream) if row]
+            rows = [*csv.reader(stream)]
     except (OSError, ValueError, csv.Error) as error:
         raise SignalFileError(f'{path} cannot be read: {reason_of(error)}.') from None
     for number, row in enumerate(rows, 1):
+        if not row or (number == 1 and [name.strip().lower() for name in row] == _HEAD):
+            continue
         try:
-            label = Label(float(row[0]), float(row[1]), row[2].strip())
+            label = Label(float(row[0]), float(row[1]), row[2].strip().lower())
         except (IndexError, ValueError):
-            if number == 1 and [name.strip().lower() for name in row] == _HEAD:
-                continue
             head = ', or the head start,end,state' if number == 1 else ''
             raise SignalFileError(
                 f'{path}, row {number} is {",".join(row)}: it must be start (s), end (s), '
@@ -141,14 +141,43 @@ def read_labels(path: Path) -> list[Label]:
             raise SignalFileError(
                 f'{path}, row {number}: {label.start:g} s is not before its end.'
             )
-        found.append(label)
-    if not any(label.state in STATES for label in found):
-        said = ', '.join(sorted({repr(label.state) for label in found}))
-        raise SignalFileError(
-            f'{path} has {f"only the states {said}" if said else "no rows"}: one at least must '
-            f'be one of {", ".join(STATES)}.'
-        )
-    return found
+        if label.state not in STATES:
+            raise SignalFileError(
+                f'{path}, row {number}: the state {row[2].strip()!r} must be one of '
+                f'{", ".join(STATES)}.'
+            )
+        for before, other in found.items():
+            if other.state != label.state and max(other[0], label[0]) < min(other[1], label[1]):
+                raise SignalFileError(
+                    f'{path}: row {before} ({_told(other)}) and row {number} ({_told(label)}) '
+                    'overlap: at one time there is one state.'
+                )
+        found[number] = label
+    if not found:
+        raise SignalFileError(f'{path} has no rows: it must have start (s), end (s), state.')
+    return [*found.values()]
+
+
+def labels_beyond(labels: Sequence[Label], signals: Signals) -> list[str]:
+    """What is to be known of labels that are scored in part: they reach beyond the recording.
+
+    Raises:
+        SignalFileError: If one lies beyond it as a whole, as those of another recording do.
+    """
+    begin, end = signals.samples[0, 0], signals.samples[-1, 0] + 1.0 / signals.rate
+    lasts = f'the recording, which lasts from {begin:.6g} to {end:.6g} s'
+    for label in labels:
+        if label.end <= begin or label.start >= end:
+            raise SignalFileError(f'The label {_told(label)} must lie in {lasts}.')
+    return [
+        f'The label {_told(label)} reaches beyond {lasts}: only what is in it is scored.'
+        for label in labels
+        if label.start < begin - _BLOCK or label.end > end + _BLOCK
+    ]
+
+
+def _told(label: Label) -> str:
+    return f'{label.start:g},{label.end:g},{label.state}'
 
 
 @dataclass(frozen=True)
@@ -178,13 +207,13 @@ class Score:
 
 
 def score(judged: Judged, labels: Sequence[Label]) -> Score:
-    """Hold the flag against labels; what has no label does not count."""
+    """Hold the flag against labels; what has none, or that of unknown, does not count."""
     return score_of(judged.times, judged.flagged, labels)
 
 
 def score_of(times: Array, flagged: NDArray[np.bool_], labels: Sequence[Label]) -> Score:
     """The same of a flag at some times, s (n,) both; a time that is no number is left out."""
-    known = np.isfinite(times)
+    known, labels = np.isfinite(times), [each for each in labels if each.state != UNKNOWN]
     times, flagged = times[known], flagged[known]
     labelled, chatter = np.zeros(len(times), bool), np.zeros(len(times), bool)
     delays, events = [], [label for label in labels if label.state == CHATTER]

@@ -53,9 +53,9 @@ def draw_judged(
     )  # fmt: skip
     for k, label in enumerate(label for label in labels if label.state == CHATTER):
         above.plot(
-            [label.start, label.end], [1.02, 1.02], transform=above.get_xaxis_transform(),
-            color=NEUTRAL, linewidth=3, clip_on=False, solid_capstyle='butt',
-            label='' if k else 'chatter by its labels',
+            np.clip(label[:2], time[0], time[-1]), [1.02, 1.02],
+            transform=above.get_xaxis_transform(), color=NEUTRAL, linewidth=3, clip_on=False,
+            solid_capstyle='butt', label='' if k else 'chatter by its labels',
         )  # fmt: skip
     if flag.any() or labels:
         # Not Matplotlib's own places outside of axes: Ubuntu 24.04 has 3.6, which knows none.

@@ -18,7 +18,7 @@ from lathe_chatter.detection.estimate import Mode
 from lathe_chatter.errors import SignalFileError
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.listening import Judged, Signals, read_signals, score
-from lathe_chatter.listening.detector_score import Label, read_labels, score_of
+from lathe_chatter.listening.detector_score import Label, labels_beyond, read_labels, score_of
 from lathe_chatter.listening.picture import draw_judged
 from lathe_chatter.model import Cut
 
@@ -189,20 +189,56 @@ def test_a_tone_is_told_with_its_frequency_and_is_no_chatter_of_a_spindle_that_h
         ('begin,end,state\n0,1,stable\n', 'row 1 is begin,end,state: .* the head start,end,state'),
         ('start,end,state\n', 'has no rows'),
         ('', 'has no rows'),
-        ('0,1,klappern\n1,2,ruhig\n', "only the states 'klappern', 'ruhig': one at least must"),
+        (
+            '0,5,stable\n6.5,9.5,chater\n',
+            "row 2: the state 'chater' must be one of idle, stable, watch, chatter",
+        ),
+        (
+            'start,end,state\n\n0,8,stable\n6.5,9.5,chatter\n',
+            r'row 3 \(0,8,stable\) and row 4 \(6.5,9.5,chatter\) overlap',
+        ),
     ],
 )
-def test_labels_that_would_score_nothing_are_refused(text: str, said: str, tmp_path: Path) -> None:
+def test_labels_that_would_score_what_is_not_meant_are_refused(
+    text: str, said: str, tmp_path: Path
+) -> None:
     path = tmp_path / 'labels.csv'
     path.write_text(text)
     with pytest.raises(SignalFileError, match=said):
         read_labels(path)
-    path.write_text('0,1,air cut\n1,2,chatter\n')
-    assert [label.state for label in read_labels(path)] == ['air cut', 'chatter']
+
+
+def test_labels_may_touch_repeat_and_begin_with_a_capital(tmp_path: Path) -> None:
+    path = tmp_path / 'labels.csv'
+    path.write_text('0,5,Stable\n4,6,stable\n6,9,Chatter\n')
+    assert [label.state for label in read_labels(path)] == ['stable', 'stable', 'chatter']
+
+
+def test_a_label_of_another_recording_is_refused_and_a_longer_one_is_said(
+    sound: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of 7 s."""
+    labels, call = tmp_path / 'labels.csv', ['listen', *written(tmp_path, 'wav', sound)]
+    labels.write_text('0,4,stable\n40,50,chatter\n')
+    assert main([*call, '--labels', str(labels)]) == 2
+    said = 'The label 40,50,chatter must lie in the recording, which lasts from 0 to 7 s.'
+    assert said in capsys.readouterr().err
+    labels.write_text('0,4,stable\n4.5,30,chatter\n')
+    assert main([*call, '--labels', str(labels)]) == 0
+    said = capsys.readouterr().out
+    assert 'WARNING  The label 4.5,30,chatter reaches beyond the recording, which lasts' in said
+    signals = read_signals(written(tmp_path, 'wav', sound)[0])
+    assert labels_beyond([Label(4.5, 7.0001, 'chatter')], signals) == []
+
+
+def test_what_is_labelled_unknown_does_not_count() -> None:
+    times = np.arange(1, 81) / 10
+    found = score_of(times, times > 3, [Label(4, 8, 'chatter'), Label(0, 4, 'unknown')])
+    assert (found.f1, found.false_alarms, found.quiet_hours) == (1.0, 0, 0.0)
 
 
 def test_labels_that_are_none_name_their_row(tmp_path: Path) -> None:
     path = tmp_path / 'labels.csv'
-    path.write_text('start,end,state\n0,1,stable\n2,1,chatter\n')
-    with pytest.raises(SignalFileError, match='row 3'):
+    path.write_text('start,end,state\n0,1,stable\n\n2,1,chatter\n')
+    with pytest.raises(SignalFileError, match='row 4'):
         read_labels(path)
