@@ -5,8 +5,8 @@ At the boundary s = i omega, and with theta = omega tau the characteristic equat
     -1/G(i omega) = C w [1 - cos theta + i (sin theta + rho theta)],   rho = C_pd / (pi D C).
 
 Without process damping (rho = 0) this is solved in closed form: C w = -1 / (2 Re G) and
-theta = pi + 2 arg G + 2 pi j with the number j = 0, 1, ... of the lobe. With it a frequency has
-two phases in a lobe, or none: the lobes bend back at low speed.
+theta = (pi + 2 arg G) mod 2 pi + 2 pi j with the number j = 0, 1, ... of the lobe. With it a
+frequency has two phases in a lobe, or none: the lobes bend back at low speed.
 """
 
 from __future__ import annotations
