@@ -31,6 +31,7 @@ from lathe_chatter.nodes.parameter_tables import PAGE
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.page.server import FRAME_PERIOD, PageServer, Viewer
 from lathe_chatter.page.versioned_values import Board
+from lathe_chatter.precompile import CHART_LOOPS, precompile
 from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.scenario import find_scenario, load_scenario
 from lathe_chatter.scenario.scenario import shipped_scenarios
@@ -58,6 +59,8 @@ class OperatorPageNode(ParameterNode):
     def __init__(self, **options: Any) -> None:
         """Listen for viewers; `serve` serves them."""
         super().__init__('operator_page', PAGE, **options)
+        # Before the first viewer comes: while it is compiled the page stands still.
+        precompile(CHART_LOOPS, say=self.get_logger().info)
         values: Any = self.values
         self.server = PageServer(self, values['host'], values['port'], values['token'])
         self.heard = DiagnosticsListener()

@@ -34,8 +34,8 @@ from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
-from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor, moves_for
-from lathe_chatter.supervisor.likely_machines import may_be
+from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
+from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor
 
 _LOOK_PERIOD = 0.02
 _SILENCE = 1.0
@@ -66,8 +66,8 @@ class SupervisorNode(ParameterNode):
     def __init__(self, **options: Any) -> None:
         """Listen, and hold still until it is known who else is there."""
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
-        # Compiled or loaded before there is any hurry.
-        list(moves_for(may_be(Machine(), 0.01), Cut(), Limits(), amplitude=1e-5))
+        # Before there is any hurry: moves are rehearsed on a virtual lathe.
+        precompile(LATHE_LOOP, MOVE_LOOPS, say=self.get_logger().info)
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
         self._state = ''
         self._chatter: bool | None = None  # until the monitor has said

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lathe_chatter.supervisor.move_search import Limits, Move, moves_for
+from lathe_chatter.supervisor.move_search import Limits, Move
 from lathe_chatter.supervisor.supervisor import ASKS, Action, Mode, Seen, Supervisor
 
-__all__ = ['ASKS', 'Action', 'Limits', 'Mode', 'Move', 'Seen', 'Supervisor', 'moves_for']
+__all__ = ['ASKS', 'Action', 'Limits', 'Mode', 'Move', 'Seen', 'Supervisor']

@@ -25,7 +25,7 @@ from support.node_bench import Bench
 from support.node_processes import NodeProcesses
 from support.page_cell import Page, looking_at
 
-from lathe_chatter.precompile import precompile
+from lathe_chatter.precompile import DETECTOR_LOOP, LATHE_LOOP, MOVE_LOOPS, precompile
 
 PATIENCE = 120.0
 """s: the start of a node takes 20 s where others keep the machine busy."""
@@ -118,7 +118,7 @@ def start(context: Context, executor: SingleThreadedExecutor) -> Iterator[Callab
 @pytest.fixture(scope='session')
 def compiled() -> None:
     """The inner loops are compiled, or else each process would do it for itself."""
-    precompile()
+    precompile(LATHE_LOOP, DETECTOR_LOOP, MOVE_LOOPS)
 
 
 @pytest.fixture
