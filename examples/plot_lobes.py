@@ -2,8 +2,8 @@
 The stability chart and its third line
 ======================================
 
-Below both limits a cut is stable. Between them a clearance decides: above the seating line the
-mean force presses the workpiece onto its bearing, and the limit of the seated machine holds.
+Below both limits a cut is stable. Between them a clearance decides: above the seating line, the
+dotted one, the mean force closes it, and the limit of the machine on its bearing holds.
 """
 
 import matplotlib.pyplot as plt

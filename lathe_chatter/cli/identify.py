@@ -146,7 +146,7 @@ def _said_of(unknown: Sequence[str]) -> str:
     """What the file lacks, and what a machine without that is: see `load_machine`."""
     others = []
     if 'bearing' in unknown and 'workpiece' not in unknown:
-        others.append('there is no bearing clearance')
+        others.append('there is no bearing')
     if 'spindle' in unknown:
         others.append('the spindle may turn at any speed')
     names = ', '.join(_UNKNOWN[name] for name in unknown)
@@ -165,7 +165,7 @@ def _figures(mode: object) -> dict[str, float]:
 
 
 def _base(source: str | None) -> MachineDescription:
-    """What is not identified: of a file, or a machine without bearing clearance."""
+    """What is not identified: of a file, or a machine without a bearing."""
     if source is not None:
         return load_machine(source)
     described = MachineDescription()

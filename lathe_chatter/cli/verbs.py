@@ -24,7 +24,7 @@ VERBS = {
     'report': 'print what happened in a recorded run and draw it',
     'page': 'show a recorded run in the browser: scrub, zoom to a sample, the path over the chart',
     'reproduce': "reproduce the paper's 14 runs: verdicts, exact roots, growth rates, figures",
-    'lobes': 'draw the stability chart: both limits, the seating line and the safe region',
+    'lobes': 'draw the stability chart: the limits, where the clearance closes, what is safe',
     'knock-map': 'map the knock that turns a stable cut into lasting chatter',
     'identify': 'make a machine file from tap tests: the modes, and how sure they are',
     'listen': 'have the monitor judge a recording: WAV, CSV, MAT, Parquet, or a recorded run',

@@ -20,7 +20,7 @@ class BearingContact(str, Enum):
     """
 
     NONE = 'none'
-    """No bearing clearance in the model, equations (1)-(7)."""
+    """No bearing in the model, equations (1)-(7)."""
     GAP = 'gap'
     """Equation (9) as printed: the bearing engages while x_wp >= gamma."""
     SEATED = 'seated'

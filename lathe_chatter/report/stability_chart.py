@@ -1,4 +1,4 @@
-"""The stability chart: both limits, the seating line, and the safe region that they leave."""
+"""The stability chart: both limits, where the clearance closes, and the safe region they leave."""
 
 from __future__ import annotations
 
@@ -43,6 +43,9 @@ paper's machine 1000 to 12,000 rev/min."""
 _ABOUT_THE_CUT = 1.25
 """Ratio of a usual range's ends to the speed of the cut, at least; of its top to the depth."""
 _HEADROOM = 2.6
+_WIDE = 10.0
+"""Width of a figure from which on its legend fits into one line, inches."""
+SEATING_LINE = 'here the force closes the clearance'
 
 
 def chart_speeds(low_rpm: float, high_rpm: float, count: int = 800) -> Array:
@@ -182,8 +185,11 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
             cut.spindle_speed_rpm, cut.depth_of_cut * _MILLI, 'o', color='k', mfc='white',
             ms=7, label='the cut', clip_on=False, zorder=5,
         )  # fmt: skip
-    place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.1)}
-    axes.legend(**place, ncols=5, fontsize=9, frameon=False)
+    wide = axes.figure.bbox.width > _WIDE * axes.figure.dpi
+    axes.legend(
+        loc='upper center', bbox_to_anchor=(0.5, -0.1 if wide else -0.13),
+        ncols=5 if wide else 2, fontsize=9, frameon=False,
+    )  # fmt: skip
     text = f'Stability chart: {bearing_text(cut)}'
     if varied and growth is not None:
         text += (
@@ -196,7 +202,7 @@ def draw_chart(  # noqa: PLR0913 -- what a chart may show
 def bearing_text(cut: Cut) -> str:
     """What a chart is drawn for beside its axes."""
     if cut.bearing_contact is BearingContact.NONE:
-        return 'no bearing clearance'
+        return 'no bearing'
     if cut.bearing_contact is BearingContact.SEATED:
         return 'on its bearing'
     feed = f'{cut.feed_speed * _MILLI:.4g} mm/s'
@@ -308,7 +314,7 @@ def draw_limits(
         )  # fmt: skip
     if contact is not BearingContact.SEATED and limits.seating_line.min() <= depth_limit:
         axes.plot(
-            speeds, shown(limits.seating_line), color=LINE, lw=1.1, ls=':', label='seating line'
+            speeds, shown(limits.seating_line), color=LINE, lw=1.1, ls=':', label=SEATING_LINE
         )
     axes.set_xlim(speeds[0], speeds[-1])
     axes.set_ylim(0.0, top)

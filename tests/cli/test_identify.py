@@ -80,7 +80,7 @@ def test_what_was_not_measured_is_said_and_left_out(
     both = ['identify', *(f'{body}={file}' for body, file in tap_tests.items())]
     assert cli.main([*both, '--output', str(output), '--force']) == 0
     said = capsys.readouterr().out
-    assert 'except that there is no bearing clearance and the spindle may turn at any' in said
+    assert 'except that there is no bearing and the spindle may turn at any' in said
     assert load_machine(output).cut.bearing_contact is BearingContact.NONE
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import LATHE
+from lathe_chatter.page import server
 from lathe_chatter.page.stability_chart import chart_key, fits, stability_chart
+from lathe_chatter.report.stability_chart import plot_lobes
 
 START = LATHE.complete({})
 
@@ -69,3 +73,10 @@ def test_a_chart_is_no_wider_than_its_speeds_once_an_advice_is_gone(advised: flo
 def test_a_chart_that_is_drawn_anew_fits(speed: float, advised: float | None) -> None:
     values = {**START, 'spindle_speed_rpm': speed}
     assert fits(stability_chart(values, [speed, advised]), [speed, advised])
+
+
+def test_a_line_has_one_name_on_the_page_and_in_a_picture() -> None:
+    drawn = Path(server.__file__).with_name('static').joinpath('draw.js').read_text()
+    _, labels = plot_lobes(Machine(), Cut()).get_legend_handles_labels()
+    assert len(labels) == 5
+    assert not [label for label in labels if f"'{label}'" not in drawn and label != 'the cut']

@@ -85,7 +85,7 @@ def test_the_probability_of_an_operating_point(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ('changes', 'said'),
     [
-        ({'bearing_contact': BearingContact.NONE}, 'no bearing clearance'),
+        ({'bearing_contact': BearingContact.NONE}, 'no bearing'),
         ({'bearing_contact': BearingContact.SEATED}, 'on its bearing'),
         ({}, 'clearance 5 µm, feed 2.5 mm/s'),
         ({'feed_per_revolution': 1.5e-3, 'bearing_clearance': 2.5e-4},

@@ -4,7 +4,7 @@ import numpy as np
 
 from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.plot_style import new_figure
-from lathe_chatter.report.stability_chart import chart_limits, draw_chart
+from lathe_chatter.report.stability_chart import chart_limits, draw_chart, plot_lobes
 from lathe_chatter.stability import growth_map
 
 
@@ -22,3 +22,15 @@ def test_growth_that_is_far_slower_than_decay_has_figures_beside_its_colours_too
     ticks = figure.axes[-1].get_yticks()
     assert slowest <= ticks.min() < 0.5 * slowest
     assert 0.5 * fastest < ticks.max() <= fastest
+
+
+def test_a_chart_of_the_usual_size_has_room_for_its_legend() -> None:
+    figure = new_figure(6.4, 4.8)
+    axes = figure.subplots()
+    plot_lobes(Machine(), Cut(), axes=axes)
+    figure.draw_without_rendering()
+    legend = axes.get_legend()
+    assert legend is not None
+    box, room = legend.get_window_extent(), figure.bbox
+    assert room.x0 <= box.x0 < box.x1 <= room.x1
+    assert axes.get_window_extent().width > 0.8 * room.width
