@@ -350,8 +350,7 @@ class Supervisor:
         if self._warned or seen.time < self._safe_since + _LASTING:
             return None
         self._warned = True
-        limit = f'margin_limit, {100.0 * self._margin_limit:.0f} %'
-        why = f'The depth may grow by {100.0 * seen.margin:.0f} % only, less than {limit}'
+        why = _small_margin(100.0 * seen.margin, 100.0 * self._margin_limit)
         if not self._move_early or self._hindrance(seen):
             return Action(f'{why}.')
         return self._move(seen, why)
@@ -372,6 +371,17 @@ def _same(one: Cut, other: Cut) -> bool:
         for name in ('spindle_speed_rpm', 'depth_of_cut', 'feed', 'speed_variation_amplitude')
     )
     return all(abs(a - b) <= _SAME * abs(b) for a, b in pairs)
+
+
+def _small_margin(margin: float, limit: float) -> str:
+    """That a margin is less than its limit, both in %."""
+    less = f'less than margin_limit, {limit:.4g} %'
+    if margin <= 0.0:
+        return f'The depth is at or beyond the limit: its margin is {margin:.3g} %, {less}'
+    rounded = f'{margin:.0f}'
+    if float(rounded) >= limit:
+        rounded = f'{math.floor(10.0 * margin) / 10.0:g}'
+    return f'The depth may grow by {rounded} % only, {less}'
 
 
 def _figures(seen: Seen) -> str:

@@ -211,6 +211,12 @@ def test_vibration_that_grows_near_its_limit_is_not_waited_on() -> None:
 def test_a_small_margin_is_warned_of_once() -> None:
     (sentence,) = looks(Supervisor(Limits(), Mode.ACT), margin=0.05)
     assert sentence == 'The depth may grow by 5 % only, less than margin_limit, 10 %.'
+    (sentence,) = looks(Supervisor(Limits(), Mode.ACT), margin=0.0996)
+    assert sentence == 'The depth may grow by 9.9 % only, less than margin_limit, 10 %.'
+    (sentence,) = looks(Supervisor(Limits(), Mode.ACT), margin=-0.012)
+    assert sentence == (
+        'The depth is at or beyond the limit: its margin is -1.2 %, less than margin_limit, 10 %.'
+    )
     assert not looks(Supervisor(Limits(), Mode.ACT), margin=0.2)
 
 
