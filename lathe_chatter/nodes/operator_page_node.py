@@ -66,6 +66,7 @@ class OperatorPageNode(ParameterNode):
         self.heard = DiagnosticsListener()
         self._board = Board()
         self._board.put('recorded', value=False)
+        self._board.put('begun', time.strftime('%H:%M:%S'))
         self._board.put('scenarios', {name: _about(name) for name in sorted(shipped_scenarios())})
         self._cells: dict[str, OperatedCell] = {}
         self._left: dict[str, float] = {}

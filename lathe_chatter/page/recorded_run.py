@@ -69,35 +69,42 @@ class RecordedRun:
         self._low: Array = np.array([low for _, low, _ in glances])
         self._high: Array = np.array([high for _, _, high in glances])
         self._times: Array = self._places[:, 0]
-        self._show(float(self._times[-1]), 'The first picture is of some places only.')
+        self._show('The first picture is of some places only.')
+        self._size = sum(file.path.stat().st_size for file in self._run.opened) / 1e6
+        self._show_reading(0.0)
         for name, value in (('recorded', True), ('scenarios', []), ('lathes', [self._topic])):
             self._board.put(name, value)
 
-    def _show(self, end: float, state: str) -> None:
+    def _show(self, state: str) -> None:
         begin = float(self._times[0])
-        self._board.put('run', {'name': str(self._path), 'begin': begin, 'end': end,
+        self._board.put('run', {'name': str(self._path), 'begin': begin, 'end': self._end,
                                 'state': state, 'version': len(self._times)})  # fmt: skip
+
+    def _show_reading(self, share: float) -> None:
+        done = min(share, 1.0) * self._size
+        self._board.put('reading', f'Reading: {done:.0f} of {self._size:.0f} MB.')
 
     # -- reading ---------------------------------------------------------------------------
 
     def _glances(self) -> Iterator[tuple[tuple[float, float, float], Array, Array]]:
         """Some chunks of each file: where, and their smallest and largest values."""
-        offset, last = 0.0, -math.inf
+        offset = 0.0
+        last = self._end = -math.inf
         for file in self._run.opened:
             places = file.known.chunks
             every = max(1, len(places) * len(self._run.opened) // _GLANCES)
-            for place in [*places[::every], *places[-1:]]:
+            for place in [*places[:-1:every], *places[-1:]]:
                 block, received = self._chunk(file, place.offset)
                 if len(block):
                     if block[0, 0] + offset <= last:
                         offset = last
-                    last = float(block[-1, 0]) + offset
+                    last = self._end = float(block[-1, 0]) + offset
                     where = float(block[0, 0]) + offset, offset, float(received[0])
                     yield where, block[:, 2:].min(axis=0), block[:, 2:].max(axis=0)
         if last == -math.inf:  # a file without an index
             for part in self._run.sample_blocks(self._topic):
                 if part.times.size:
-                    values = _picked(part)[:, 2:]
+                    values, self._end = _picked(part)[:, 2:], float(part.times[-1])
                     where = part.times[0], 0.0, float(part.log_times[0])
                     yield where, values.min(axis=0), values.max(axis=0)
 
@@ -123,16 +130,17 @@ class RecordedRun:
             self._history = await asyncio.to_thread(read_history, self._path, self._topic)
             self._show_history(self._history)
         except LatheChatterError as error:
-            self._show(float(self._times[-1]), f'What happened cannot be read: {error}')
+            self._show(f'What happened cannot be read: {error}')
+        self._board.put('reading', '')
 
     def _read_all(self) -> None:
-        end = float(self._times[-1])
-        length = max(_STRETCH, end / _MOST)
+        length = max(_STRETCH, self._end / _MOST)
         numbers: list[Integers] = []
         lows: list[Any] = []
         highs: list[Any] = []
         places: list[Array] = []
-        offset, last, shown = 0.0, -math.inf, -math.inf
+        offset, last, passed = 0.0, -math.inf, 0
+        expected = sum(file.count(self._topic) for file in self._run.opened)
         for part in self._run.sample_blocks(self._topic, COLUMNS):
             times = part.times
             if not times.size:
@@ -156,15 +164,15 @@ class RecordedRun:
                 received = part.log_times[part.rows > 0][inside]
                 on = times[first[inside]] + offset
                 places.append(np.column_stack((on, np.full(len(on), offset), received)))
-            if last - shown > 0.05 * end:
-                shown = last
-                self._board.put('reading', min(1.0, last / max(end, 1e-9)))
+            passed += len(part.rows)
+            self._show_reading(passed / expected if expected else last / max(self._end, 1e-9))
         self._places = np.concatenate(places)
         self._low, self._high = np.concatenate(lows), np.concatenate(highs)
         self._times = np.concatenate(numbers).astype(float) * length
-        self._board.put('reading', None)
+        self._end = last
+        self._board.put('reading', f'What happened is sought in all {self._size:.0f} MB.')
         damage = '; '.join(f'{d.file.name}: {d.reason}' for d in self._run.damage)
-        self._show(last, f'Not all can be read: {damage}.' if damage else '')
+        self._show(f'Not all can be read: {damage}.' if damage else '')
 
     def _closely(self, begin: float, end: float) -> Array:
         """The samples between two times of the run, s, by times of the run (n, 6)."""

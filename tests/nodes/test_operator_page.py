@@ -335,6 +335,7 @@ def test_a_killed_lathe_is_told_and_is_back_by_itself(page: Page, browser: Brows
 
 
 def test_a_killed_page_is_told_and_is_back_by_itself(page: Page, browser: Browser) -> None:
+    operate(browser)
     port = page.url().split(':')[2].strip('/')
     page.kill('operator_page')
     said = 'document.querySelector("#gone").textContent'
@@ -344,6 +345,10 @@ def test_a_killed_page_is_told_and_is_back_by_itself(page: Page, browser: Browse
     assert browser.run('document.querySelector("#p-depth_of_cut").disabled')
     page.start('operator_page', f'port:={port}')
     browser.until('document.querySelector("#gone").hidden && signals', 'the page', PATIENCE)
+    said = 'document.querySelector("#notice").textContent'
+    browser.until(f'{said}.includes("you are looking on")', 'that control is lost')
+    begun = browser.run('document.querySelector("#log").lastElementChild.textContent')
+    assert re.fullmatch(r'This page began at \d\d:\d\d:\d\d: what happened before .*', begun)
     browser.until(f'{LAMP} === "stable"', 'the lamp', PATIENCE)
 
 

@@ -75,6 +75,9 @@ def test_the_supervisor_asks_in_the_page_and_is_answered_there(browser: Browser)
     assert 0 < seen <= browser.run('innerHeight')
     assert browser.run('cell.lathe_values.spindle_speed_rpm') == 3000.0
     browser.click('[data-call=accept]')
+    notice = 'document.querySelector("#notice").textContent'
+    answer = browser.until(f'/I set/.test({notice}) && {notice}', 'the answer')
+    assert not re.search(r'_rpm| um\b|1/s', answer)
     browser.until('cell.lathe_values.spindle_speed_rpm !== 3000', 'the move', PATIENCE)
     browser.until('document.querySelector("#question").hidden', 'no question any more')
     browser.until(f'{LAMP} === "stable"', 'the lamp out', PATIENCE)

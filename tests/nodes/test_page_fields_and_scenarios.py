@@ -52,11 +52,47 @@ def test_what_is_no_number_changes_nothing_and_is_said(
     assert browser.run('cell.lathe_values.depth_of_cut') == before
 
 
+def test_a_refusal_goes_with_the_next_entering(browser: Browser) -> None:
+    operate(browser)
+    for text in ('0.45', '0.45', '0.46'):  # a good value, the present one, another
+        browser.enter('#p-depth_of_cut', '4,000')
+        browser.until(REFUSAL, 'the refusal')
+        browser.enter('#p-depth_of_cut', text)
+        browser.until(f'!{REFUSAL}', 'no refusal')
+        browser.until(f'cell.lathe_values.depth_of_cut === {text} / 1e3', 'the change')
+
+
+@pytest.mark.parametrize('entered', [True, False])
+def test_enter_sets_what_stands_there_whatever_others_have_set(
+    browser: Browser, entered: bool
+) -> None:
+    operate(browser)
+    other = 'ask({do: "set", node: "lathe", values: {depth_of_cut: %s}})'
+    field = 'document.querySelector("#p-depth_of_cut").value'
+    browser.run(other % '0.0005')
+    browser.until(f'{field} === "0.5"', 'the cut before')
+    browser.enter('#p-depth_of_cut', '0.5')
+    if not entered:
+        browser.run('document.activeElement.select()')
+        browser.command('Input.insertText', text='0.5')
+    browser.run(other % '0.00055')
+    browser.until('cell.lathe_values.depth_of_cut === 0.00055', 'the cut of another')
+    assert browser.run('document.activeElement.id') == 'p-depth_of_cut'
+    if entered:  # nothing has been typed since
+        browser.until(f'{field} === "0.55"', 'the value of another')
+        browser.enter('#p-depth_of_cut', '0.5')
+    else:
+        assert browser.run(field) == '0.5'
+        browser.key('Enter', 13, '\r')
+    browser.until('cell.lathe_values.depth_of_cut === 0.0005', 'what stands in the field')
+
+
 def test_an_answer_that_comes_late_wipes_no_later_refusal(browser: Browser) -> None:
     operate(browser)
     browser.run(
         '(field => { for (const text of ["0.45", "abc"]) {'
-        ' field.value = text; field.dispatchEvent(new Event("change")); } })'
+        ' field.value = text; for (const kind of ["input", "change"])'
+        ' field.dispatchEvent(new Event(kind)); } })'
         '(document.querySelector("#p-depth_of_cut"))'
     )
     browser.until('!controls.get("depth_of_cut").busy', 'the answer')
@@ -139,6 +175,34 @@ def test_a_flag_of_a_run_before_lights_no_lamp(browser: Browser) -> None:
         f' const seen = {LAMP}; cell.flag = flag; showLamp(); return seen; }})()'
     )
     assert lamp == 'unknown'
+
+
+def test_no_margin_is_shown_amid_chatter_and_rest_has_no_digits(browser: Browser) -> None:
+    shown = browser.run(
+        '(() => { const {flag, figures} = cell; const seen = [false, true].map(up => {'
+        ' Object.assign(cell, {flag: {up}, figures: {margin: 0.37, amplitude: 3e-15}});'
+        ' showFigures(); return ["margin", "amplitude"].map(id => $(id).textContent); });'
+        ' Object.assign(cell, {flag, figures}); showFigures(); return seen; })()'
+    )
+    (margin, amplitude), (amid, _) = shown
+    assert margin.startswith('37')
+    assert margin.endswith(' %')
+    assert amid == '\u2013'
+    assert amplitude == '< 0.001 \u00b5m'
+
+
+def test_signals_are_bands_between_smallest_and_largest(browser: Browser) -> None:
+    browser.until('plots.get("displacement-1")?.data[0].length > 9', 'the last minute', PATIENCE)
+    times, *values = browser.run('plots.get("displacement-1").data.map(list => [...list])')
+    assert times == sorted(set(times))
+    low, high = values[:2], values[2:]
+    pairs = [
+        pair for a, b in zip(low, high, strict=True)
+        for pair in zip(a, b, strict=True) if None not in pair
+    ]  # fmt: skip
+    assert pairs
+    assert all(least <= most for least, most in pairs)
+    assert any(least < most for least, most in pairs)
 
 
 def test_a_killed_recorder_records_nothing(page: Page, browser: Browser) -> None:

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +25,7 @@ from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.page.live_signals import SIGNALS
 from lathe_chatter.page.recorded_run import RecordedRun
-from lathe_chatter.page.server import Viewer
+from lathe_chatter.page.server import PageServer, Viewer
 from lathe_chatter.recording import LatheRun, read_run
 
 PATIENCE = 120.0
@@ -142,6 +143,18 @@ def test_one_lathe_of_several_is_shown(cell: str, tmp_path: Path) -> None:
     assert begin == pytest.approx(0.02 * (FLAGS[cell] + 1))
 
 
+def test_the_first_picture_ends_where_the_run_does(run: Path) -> None:
+    shown = RecordedRun(run)
+    page = look(shown, do='at', time=4.1)[0]['page']
+    assert page['run']['end'] == pytest.approx(12.0)
+    size = sum(file.stat().st_size for file in run.glob('*.mcap')) / 1e6
+    assert page['reading'] == f'Reading: 0 of {size:.0f} MB.'
+    asyncio.run(shown.read())
+    page = look(shown, do='at', time=4.1)[0]['page']
+    assert page['run']['end'] == pytest.approx(12.0)
+    assert page['reading'] == ''
+
+
 def test_what_is_no_run_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(RunReadError):
         RecordedRun(tmp_path)
@@ -198,6 +211,38 @@ def test_a_browser_scrubs_through_the_run(served: str, tmp_path: Path, width: in
         assert browser.complaints == []
     finally:
         browser.close()
+
+
+@pytest.mark.skipif(chromium() is None, reason='no Chromium is here')
+def test_what_is_not_read_yet_is_said_to_be_so(run: Path, tmp_path: Path) -> None:
+    shown = RecordedRun(run)
+    server = PageServer(shown, '127.0.0.1', 0)
+    loop = asyncio.new_event_loop()
+    serving = threading.Thread(target=lambda: loop.run_until_complete(server.run()))
+    serving.start()
+    browser = Browser(tmp_path / 'profile')
+    state = 'document.querySelector("#run-state").textContent'
+    lamp = 'document.querySelector("#lamp-word").textContent'
+    try:
+        browser.open(server.url)
+        browser.until(f'{state}.startsWith("Reading: 0 of ")', 'that it is read')
+        browser.until('document.querySelector("#overview canvas")', 'the first picture')
+        assert browser.run(lamp) == 'reading'
+        assert browser.text('#clock') == ''
+        assert browser.text('#at-text').startswith('about ')
+        assert 'come when all is read' in browser.text('#chart-text')
+        asyncio.run_coroutine_threadsafe(shown.read(), loop).result(PATIENCE)
+        browser.until(f'["no chatter", "CHATTER"].includes({lamp})', 'the lamp')
+        browser.until('document.querySelector("#clock").textContent === "12.000 s"', 'the end')
+        browser.until('document.querySelector("#chart-text").textContent.includes("mm")', 'it')
+        assert browser.run('run.at') == pytest.approx(12.0)
+        assert browser.text('#at-text') == '12.00 s'
+        assert browser.text('#run-state') == ''
+        assert browser.complaints == []
+    finally:
+        browser.close()
+        server.end()
+        serving.join(PATIENCE)
 
 
 def test_it_is_only_looked_at(served: str) -> None:

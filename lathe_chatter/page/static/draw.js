@@ -82,14 +82,18 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
   for (const u of plots.values()) u.redraw();
 });
 
-// Envelopes over time of tool and workpiece: smallest and largest value of each stretch in turn.
+// Bands over time from the smallest to the largest value of each stretch: lines that joined these in
+// turn would look like waves. `values` has the smallest of SIGNALS, then the largest.
 function drawSignals(id, what, times, values, height, onSelect) {
   const factor = what === 'displacement' ? MICRO : MILLI;
   const unit = what === 'displacement' ? 'µm' : 'mm/s';
-  const line = (label, colour) => ({label, stroke: () => css(colour), width: 1, points: {show: false}});
+  const line = (label, colour, more) => ({label, stroke: () => css(colour), width: 1, points: {show: false}, ...more});
+  const band = (low, colour) => ({series: [low + 2, low], fill: () => `${css(colour)}80`});
+  const [tool, workpiece, mostTool, mostWorkpiece] = [0, 2, 4, 6].map(s => values[s + (what === 'velocity')]);
   const u = plot(id, height, () => ({
-    height, legend: legend(['tool', 'workpiece']),
-    series: [{}, line('tool', 'tool'), line('workpiece', 'workpiece')],
+    height, legend: legend(['tool', 'workpiece', 'tool', 'workpiece']),
+    series: [{}, line('tool', 'tool'), line('workpiece', 'workpiece'), line('tool', 'tool', {class: 'most'}), line('workpiece', 'workpiece', {class: 'most'})],
+    bands: [band(1, 'tool'), band(2, 'workpiece')],
     scales: {x: {time: false}, y: {range: room(factor * (what === 'displacement' ? 1e-8 : 1e-5))}},
     axes: [axis('simulated time / s'), axis(height < 150 ? unit : `${what} / ${unit.includes('/') ? `(${unit})` : unit}`, {side: 3})],
     cursor: {show: !!onSelect, drag: {x: true, y: false, setScale: false}},
@@ -99,17 +103,17 @@ function drawSignals(id, what, times, values, height, onSelect) {
         u.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
       }
     }]} : {},
-  }), [times, values[0], values[1]]);
+  }), [times, tool, workpiece, mostTool, mostWorkpiece]);
   if (!u) return;
-  const range = column => {
-    const known = column.filter(v => v != null);
-    return known.length ? `${number(Math.min(...known))} to ${number(Math.max(...known))}` : 'unknown';
+  const range = (low, high) => {
+    const known = [low, high].map(column => column.filter(v => v != null));
+    return known[0].length ? `${near(Math.min(...known[0]))} to ${near(Math.max(...known[1]))}` : 'unknown';
   };
   const now = performance.now();
   if (!(now - u.described < 2000)) {
     u.described = now;
     const span = times.length ? `from ${number(times[0])} to ${number(times[times.length - 1])} s` : '';
-    describe(id, `${what} ${span}: tool ${range(values[0])}, workpiece ${range(values[1])} ${unit}`);
+    describe(id, `${what} ${span}: tool ${range(tool, mostTool)}, workpiece ${range(workpiece, mostWorkpiece)} ${unit}`);
   }
 }
 
@@ -118,6 +122,9 @@ const plain = new Intl.NumberFormat('en', {maximumFractionDigits: 9, useGrouping
 function number(value, digits = 3) {
   return value == null || !isFinite(value) ? '–' : plain.format(Number(value.toPrecision(digits)));
 }
+
+// A number in µm or mm/s to be read: what is at rest has no digits.
+const near = value => number(Math.abs(value) < 1e-3 ? 0 : value);
 
 // Axes for what is drawn by hand over them.
 // Five to six decades, from a power of ten: uPlot divides an axis from 9.6e-12 without end, and one
@@ -164,7 +171,7 @@ function drawPortrait(id, body, line, points) {
     }
     ctx.restore();
   });
-  describe(id, `Phase portrait of the ${body}: ${number(Math.min(...x))} to ${number(Math.max(...x))} µm, ${points.length / 2} turns`);
+  describe(id, `Phase portrait of the ${body}: ${near(Math.min(...x))} to ${near(Math.max(...x))} µm, ${points.length / 2} turns`);
 }
 
 // What was drawn of a cut that has begun anew, and of which nothing has come yet.
@@ -227,7 +234,7 @@ function drawSpectrum(amplitudes, step, speed, chatter, about = chatter) {
   }), [x, y], {turn: speed / 60, chatter, most});
   let peak = 1;
   amplitudes.forEach((v, k) => { if (k && v > amplitudes[peak]) peak = k; });
-  describe('spectrum', `Spectrum of the tool: largest ${number(amplitudes[peak] * MICRO)} µm at ${number(peak * step)} Hz${chatter ? `, chatter at ${number(chatter)} Hz` : ''}`);
+  describe('spectrum', `Spectrum of the tool: largest ${near(amplitudes[peak] * MICRO)} µm at ${number(peak * step)} Hz${chatter ? `, chatter at ${number(chatter)} Hz` : ''}`);
 }
 
 const LIMITS = [

@@ -15,13 +15,13 @@ const PRIMARY = ['spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'bear
 
 let socket = null, retries = 0, asked = 0, frames = 0;
 const waiting = new Map();
-let cell, page, server, trail, signals, envelopes, recommended, recorded = false, figuresDue = false;
+let cell, page, server, trail, signals, envelopes, recommended, recorded = false, figuresDue = false, operated = false;
 
 function forget() {
   cell = {};
   trail = [];
   signals = null;
-  envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
+  envelopes = WINDOWS.map(() => ({next: 0, times: [], values: [...SIGNALS, ...SIGNALS].map(() => [])}));
 }
 
 const worded = name => name.replace(/_rpm$/, '').replaceAll('_', ' ');
@@ -39,6 +39,7 @@ function plainly(text) {
 // ---- connection ------------------------------------------------------------------------------
 
 function connect() {
+  operated ||= !!server?.operating;
   forget();
   page = {};
   server = {};
@@ -50,6 +51,8 @@ function connect() {
     retries = 0;
     const token = sessionStorage.getItem('token');
     if (token) ask({do: 'token', token}).then(answer => { if (!answer.ok) notify(answer); });
+    if (operated) notify({ok: false, text: 'The connection was lost: you are looking on. Press Operate to go on.'});
+    operated = false;
     wish({do: 'next'});
   };
   socket.onmessage = message => {
@@ -89,7 +92,7 @@ function ask(message) {
 
 function notify({ok, text}) {
   if (!text) return;
-  $('notice').textContent = text;
+  $('notice').textContent = plainly(text);
   $('notice').hidden = false;
   $('notice').classList.toggle('bad', !ok);
   clearTimeout(notify.timer);
@@ -129,6 +132,7 @@ function takePage(news) {
   }
   if (recorded) takeRun(news);
   if ('other_pages' in news) takeServer({});
+  if ('begun' in news) showLog();
   if (news.scenarios) {
     $('scenario').replaceChildren(...Object.keys(news.scenarios).map(name => new Option(worded(name), name)));
     describeScenario();
@@ -139,7 +143,7 @@ function choose() {
   forget();
   // What the one before had, this one may not have, and then says nothing of.
   makeSupervisor(null);
-  $('log').replaceChildren();
+  showLog();
   showQuestion();
   for (const id of ['scenario-text', 'recording', 'health', 'chart-text']) $(id).textContent = '';
   sessionStorage.setItem('lathe', $('lathes').value);
@@ -214,7 +218,7 @@ function showAlive() {
   if (!recorder) words.push('No recorder is there.');
   const heard = cell.statuses?.monitor?.samples;
   for (const text of [cell.complaint, heard?.level > 1 && run !== 'paused' ? heard.message : '']) if (text) words.push(text);
-  showGone(words.join(' '));
+  showGone(plainly(words.join(' ')));
   showLamp();
   showStatuses();
 }
@@ -227,7 +231,7 @@ function showLamp() {
   const other = signals && (now == null || (flag?.up && at > now + 0.5));
   const known = flag && !other && !stale() && (recorded || alive?.monitor);
   $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
-  const word = !known ? 'unknown' : flag.up ? 'CHATTER' : state ?? 'no chatter';
+  const word = !known ? (run.reading ? 'reading' : 'unknown') : flag.up ? 'CHATTER' : state ?? 'no chatter';
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
   const since = known && flag.up && at != null ? `since ${Number(at).toFixed(2)} s` : '';
   if ($('lamp-since').textContent !== since) $('lamp-since').textContent = since;
@@ -241,8 +245,8 @@ function showFigures() {
   const texts = {
     growth_rate: f.growth_rate == null ? '–' : `${number(f.growth_rate)}${error('standard error of the growth rate, 1/s')} /s`,
     frequency: f.frequency == null ? '–' : `${f.frequency.toFixed(1)} Hz`,
-    amplitude: f.amplitude == null ? '–' : `${number(f.amplitude * MICRO)} µm`,
-    margin: f.margin == null ? '–' : `${(f.margin * 100).toFixed(0)}${margin == null || isNaN(margin) ? '' : ` ± ${(margin * 100).toFixed(0)}`} %`,
+    amplitude: f.amplitude == null ? '–' : `${f.amplitude < 1e-9 ? '< 0.001' : number(f.amplitude * MICRO)} µm`,
+    margin: f.margin == null || cell.flag?.up ? '–' : `${(f.margin * 100).toFixed(0)}${margin == null || isNaN(margin) ? '' : ` ± ${(margin * 100).toFixed(0)}`} %`,
     recommended: f.recommended_speed_rpm == null ? '–' : `${Math.round(f.recommended_speed_rpm)} rev/min`,
   };
   for (const [id, text] of Object.entries(texts)) if ($(id).textContent !== text) $(id).textContent = text;
@@ -268,7 +272,7 @@ function showStatuses() {
 }
 
 function showLog() {
-  const items = [...cell.log].reverse().map(entry => {
+  const items = [...(cell.log ?? [])].reverse().map(entry => {
     const item = document.createElement('li'), who = document.createElement('span');
     who.className = 'who';
     who.textContent = `${entry.node.split('/').pop()}: `;
@@ -276,11 +280,13 @@ function showLog() {
     item.append(who, plainly(entry.text));
     return item;
   });
-  $('log').replaceChildren(...items);
+  const begun = document.createElement('li');
+  begun.textContent = `This page began at ${page.begun}: what happened before is in the record, where one was kept.`;
+  $('log').replaceChildren(...items, begun);
 }
 
 function showScenario({playing, text, before}) {
-  $('scenario-text').textContent = text;
+  $('scenario-text').textContent = plainly(text);
   $('play').textContent = playing ? 'Stop' : 'Play';
   $('back').hidden = playing || !before;
 }
@@ -291,7 +297,7 @@ function describeScenario() {
 
 function takeSignals(news, arrays) {
   if (signals && signals.epoch !== news.epoch) {
-    envelopes = WINDOWS.map(() => ({next: 0, times: [], values: SIGNALS.map(() => [])}));
+    envelopes = WINDOWS.map(() => ({next: 0, times: [], values: [...SIGNALS, ...SIGNALS].map(() => [])}));
     trail = [];
     document.querySelectorAll('.refusal').forEach(each => { each.textContent = ''; });
     signals = news;
@@ -302,20 +308,19 @@ function takeSignals(news, arrays) {
   news.spans.forEach(([first, count, step], k) => {
     const e = envelopes[k], values = arrays[`envelope_${k}`], width = SIGNALS.length;
     const missed = e.times.length ? Math.min(first - e.next, COUNT) : 0;
-    const add = (at, low, high) => {
-      e.times.push(at * step, (at + 0.5) * step);
-      for (let s = 0; s < width; s++) e.values[s].push(low(s), high(s));
+    const add = (at, of) => {
+      e.times.push((at + 0.5) * step);
+      e.values.forEach((list, s) => list.push(of(s)));
     };
-    for (let m = missed; m > 0; m--) add(first - m, () => null, () => null);
+    for (let m = missed; m > 0; m--) add(first - m, () => null);
     for (let m = 0; m < count; m++) {
-      const of = offset => s => {
-        const v = values[(offset + m) * width + s];
+      add(first + m, s => {
+        const v = values[((s < width ? 0 : count) + m) * width + s % width];
         return Number.isNaN(v) ? null : v * (s % 2 ? MILLI : MICRO);
-      };
-      add(first + m, of(0), of(count));
+      });
     }
     e.next = first + count;
-    const old = e.times.length - 2 * COUNT;
+    const old = e.times.length - COUNT;
     if (old > 0) for (const list of [e.times, ...e.values]) list.splice(0, old);
     if (count && (k === 0 || frames % 10 === 0)) drawEnvelope(k);
   });
@@ -329,8 +334,8 @@ function showClock() {
 
 function drawEnvelope(k, height = k ? 130 : 170, onSelect = null) {
   const {times, values} = envelopes[k];
-  drawSignals(`displacement-${k}`, 'displacement', times, [values[0], values[2]], height, onSelect);
-  drawSignals(`velocity-${k}`, 'velocity', times, [values[1], values[3]], height, onSelect);
+  drawSignals(`displacement-${k}`, 'displacement', times, values, height, onSelect);
+  drawSignals(`velocity-${k}`, 'velocity', times, values, height, onSelect);
 }
 
 function takeCloseup(figures, arrays) {
@@ -445,8 +450,8 @@ function makeControl(row) {
 
   function show(value, force) {
     const shown = typeof value === 'number' ? Number((value * factor).toPrecision(9)) : String(value);
-    if (!force && (control.busy || control.next != null)) return;
-    if (force || !control.typing) field.value = shown;
+    if (value == null || (!force && (control.busy || control.next != null))) return;
+    if (force || !control.typing || field.disabled) field.value = shown;
     if (slider) {
       slider.max = shown > end ? shown * 1.5 : end;
       slide(shown);
@@ -472,21 +477,27 @@ function makeControl(row) {
     const outside = last < row.low || last > row.high, onShop = n => number(n * factor, 9);
     const allowed = row.allowed.slice(0, row.allowed.length - row.unit.length).replace(/-?\d[\d.]*(e[-+]?\d+)?/g, onShop);
     const here = `${onShop(last)} ${unit}: it ${allowed.trim()} ${unit}`.trim() + '. Nothing was changed.';
-    if (answer.ok) return;  // of what was typed since, there may be a refusal
+    // Of what was typed since, there may be a refusal; and others may have set it meanwhile.
+    if (answer.ok) return void setTimeout(() => show(cell.lathe_values?.[row.name]), 500);
     refusal.textContent = outside ? here : answer.text;
     if (cell.lathe_values) show(cell.lathe_values[row.name], true);
   }
-  field.addEventListener('change', () => {
-    if (listed) return send(row.type === 1 ? field.value === 'true' : field.value);
-    const {value, why} = typed(field.value);
+  function enter() {
+    const {value, why} = typed(field.value), wanted = control.typing;
     control.typing = false;
     refusal.textContent = why ?? '';
     if (why) return show(cell.lathe_values[row.name], true);
     slide(field.value = value);
-    send(value / factor);
-  });
-  if (listed) return place;
+    if (wanted) send(value / factor);
+  }
+  if (listed) {
+    field.addEventListener('change', () => send(row.type === 1 ? field.value === 'true' : field.value));
+    return place;
+  }
   field.addEventListener('input', () => { control.typing = true; });
+  // No `change` comes where the same is typed again, and the lathe may have another value meanwhile.
+  field.addEventListener('keydown', event => { if (event.key === 'Enter') enter(); });
+  for (const kind of ['change', 'blur']) field.addEventListener(kind, () => { if (control.typing) enter(); });
   slider.addEventListener('input', () => {
     field.value = Number(Number(slider.value).toPrecision(6));
     slide(field.value);

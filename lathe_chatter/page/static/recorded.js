@@ -2,18 +2,20 @@
 'use strict';
 
 const SPANS = [0.01, 0.1, 1, 2, 10, 60, 600, 3600];
-const run = {at: 0, span: 2, busy: false, again: false, path: []};
+const run = {span: 2, reading: '', state: '', busy: false, again: false, path: []};
 
 function takeRun(news) {
   if (news.run) {
     const {name, begin, end, state, version} = news.run;
     $('run-name').textContent = `Recorded run ${name}`;
     Object.assign($('at'), {min: begin, max: end});
-    if (!run.begun) {
+    if (run.end == null) {
       $('span').replaceChildren(...SPANS.filter(s => s < end - begin).map(s => new Option(`${s} s`, s)), new Option('all', end - begin));
       run.span = Number($('span').value = String(SPANS.filter(s => s <= 2 && s < end - begin).pop() ?? end - begin));
-      Object.assign(run, {begun: true, at: end});
     }
+    // Who has not left the end stays there, wherever it is found to be.
+    Object.assign(run, {at: run.at < run.end ? Math.min(run.at, end) : end, end});
+    $('span').lastElementChild.value = end - begin;
     if (version !== run.version) {
       run.version = version;
       view('overview', begin, end).then(() => look(run.at));
@@ -21,19 +23,22 @@ function takeRun(news) {
     run.state = state;
   }
   if ('reading' in news) run.reading = news.reading;
-  $('run-state').textContent = [run.state, run.reading == null ? '' : `Read so far: ${(run.reading * 100).toFixed(0)} %.`].join(' ');
+  $('run-state').textContent = `${run.reading} ${run.state}`.trim();
+  if (run.reading) $('chart-text').textContent = 'Chart, lamp and what happened come when all is read.';
+  else if ('reading' in news) $('chart-text').textContent = '';
+  showLamp();
   if (news.path) run.path = news.path;
   if (news.events) {
     $('log').replaceChildren(...news.events.map(([time, text]) => {
       const item = document.createElement('li'), button = document.createElement('button');
       button.type = 'button';
-      button.textContent = `${time.toFixed(3)} s: ${text}`;
+      button.textContent = `${time.toFixed(3)} s: ${plainly(text)}`;
       button.onclick = () => look(time);
       item.append(button);
       return item;
     }));
-    look(run.at);
   }
+  if (news.reading === '') look(run.at);
 }
 
 function view(plot, from, to) {
@@ -47,7 +52,7 @@ async function look(at, span = run.span) {
   $('at').value = at;
   $('at').setAttribute('aria-valuetext', `${at.toFixed(2)} s`);
   plots.get('overview')?.redraw(false);
-  $('at-text').value = `${at.toFixed(span < 0.2 ? 4 : 2)} s`;
+  $('at-text').value = `${run.reading ? 'about ' : ''}${at.toFixed(span < 0.2 ? 4 : 2)} s`;
   run.again = true;
   if (run.busy) return;
   run.busy = true;
@@ -59,25 +64,18 @@ async function look(at, span = run.span) {
 }
 
 function takeView({from, to, plot}, {times, values}) {
-  const n = times.length, column = s => {
-    const factor = s % 2 ? MILLI : MICRO, list = [];
-    for (let k = 0; k < n; k++) list.push(values[k * 4 + s] * factor, values[(n + k) * 4 + s] * factor);
-    return list;
-  };
-  const x = [];
-  times.forEach((t, k) => {
-    const next = k + 1 < n ? times[k + 1] : t;
-    x.push(from + t, from + (t + next) / 2);
-  });
+  const n = times.length, x = Array.from(times, t => from + t);
+  const columns = [...SIGNALS, ...SIGNALS].map((_, s) =>
+    x.map((_, k) => values[((s < 4 ? 0 : n) + k) * 4 + s % 4] * (s % 2 ? MILLI : MICRO)));
   const select = (begin, end) => look(end, end - begin);
   if (plot === 'overview') {
-    drawSignals('overview', 'displacement', x, [column(0), column(2)], 130, select);
+    drawSignals('overview', 'displacement', x, columns, 130, select);
     Object.assign(plots.get('overview') ?? {}, {mark: markMoment}).redraw?.(false);
     return;
   }
-  drawSignals('displacement-0', 'displacement', x, [column(0), column(2)], 220, select);
-  drawSignals('velocity-0', 'velocity', x, [column(1), column(3)], 220, select);
-  $('clock').textContent = `${to.toFixed(3)} s`;
+  drawSignals('displacement-0', 'displacement', x, columns, 220, select);
+  drawSignals('velocity-0', 'velocity', x, columns, 220, select);
+  $('clock').textContent = run.reading ? '' : `${to.toFixed(3)} s`;
 }
 
 // The moment in the overview; and its slider, as wide as the axis above it.
