@@ -96,7 +96,7 @@ the tool leaves the cut."""
 _STEADY, _SHORT, _STEADIER = 0.12, 32, 0.1
 """Spread of the energy over its mean, over all hops that are remembered and over so many, that is
 steady: noise in a mode has several times as much."""
-_SATURATED = 20
+SATURATED = 20
 _CALM, _PERSISTENT = 20, 20
 _QUIET, _RECENT, _LASTING = 0.12, 3, 32
 """Part of its peak at which chatter is over, if it is not back at the baseline before; the window
@@ -268,7 +268,7 @@ def _decide(
 ) -> None:
     """Raise the alarm, or clear it."""
     now = state.now[0]
-    alarm = now.score >= now.strictness or now.saturated >= _SATURATED
+    alarm = now.score >= now.strictness or now.saturated >= SATURATED
     # What is left of a cut that has settled are roundings, and these repeat themselves.
     alarm = alarm and strongest_amplitude > now.smallest_amplitude
     now.suspected = now.suspected + 1 if alarm else 0

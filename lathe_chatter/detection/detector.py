@@ -97,7 +97,7 @@ class ChatterDetector:
         )
         self._nominal = nominal_rpm / 60.0
         self._advisers: list[SpeedAdviser] = []
-        self._advised = True
+        self._advised, self._depth = True, math.nan
         self.set_machine(machine, first=True)
         self.reset()
 
@@ -108,6 +108,7 @@ class ChatterDetector:
 
     def _forget(self) -> None:
         self._estimate: Estimate = Estimate()
+        self._depth = math.nan
         for adviser in self._advisers:
             adviser.forget()
         self._forget_format()
@@ -151,19 +152,29 @@ class ChatterDetector:
             return replace(self._estimate, mode=Mode.BLIND)
         return self._estimate
 
-    def follow_depth(self, factor: float) -> None:
-        """Take it that the cut is deeper or less deep: what is recommended is for this depth.
+    def follow_depth(self, depth: float) -> None:
+        """Take it that the cut is so deep: what is recommended amid chatter is for this depth.
 
         The samples tell it too late: of chatter that has grown out of the cut less force is heard
         than there is.
 
         Args:
-            factor: The depth of cut over that of before; nan where nobody knows, and then nothing
+            depth: Of cut, m; nan where it has become another and nobody knows which: then nothing
                 is recommended that depends on it.
         """
+        before, self._depth = self._depth, depth
+        if before == depth:
+            return
         for adviser in self._advisers:
-            adviser.follow_depth(factor)
+            if math.isfinite(before) or math.isnan(depth):
+                adviser.follow_depth(depth / before if before > 0.0 else math.nan)
+            adviser.follow_cutting(self._told_cutting)
         self._take_request()
+
+    @property
+    def _told_cutting(self) -> float:
+        """C w as it is told, N/m; nan where nobody tells."""
+        return math.nan if self._told is None else self._told.cutting_stiffness(self._depth)
 
     def _take_request(self) -> None:
         """What is recommended now, where something was."""
@@ -196,6 +207,7 @@ class ChatterDetector:
             self._advisers.insert(0, self._advisers.pop(self._speaker))
         for adviser in self._advisers:
             adviser.judge_with(self._machine)
+            adviser.follow_cutting(self._told_cutting)
         self._advised = False
         self._framer.restart_stretch()
         self._forget_format()
@@ -214,6 +226,7 @@ class ChatterDetector:
             self._prepared, self._mode = (form.rate, mode), mode
             while len(self._advisers) < len(bands):
                 self._advisers.append(SpeedAdviser(self._machine, self._speed_range))
+                self._advisers[-1].follow_cutting(self._told_cutting)
             age = ADVISED_LONG_AGO if self._advised else TO_BE_ADVISED
             alarm_age = age if self._estimate.chatter else None
             self._speaker, self._advised, self._known = 0, True, False

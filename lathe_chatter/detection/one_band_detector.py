@@ -10,6 +10,7 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.detection.baseline import SETTLING
 from lathe_chatter.detection.cut_identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
+from lathe_chatter.detection.decision import SATURATED
 from lathe_chatter.detection.detector_state import (
     CHATTER,
     HOPS,
@@ -24,6 +25,7 @@ from lathe_chatter.detection.detector_state import (
 from lathe_chatter.detection.filter_design import Band, design, gain, pace_of, thinning_of
 from lathe_chatter.detection.hop_loop import take_hops
 from lathe_chatter.detection.machine_check import MachineFit, Verdict
+from lathe_chatter.detection.reported_figures import ONSET
 from lathe_chatter.detection.signal_conditioning import HOP_SUMS, SETTINGS, new_memory
 from lathe_chatter.detection.signal_framing import StreamFormat
 from lathe_chatter.detection.speed_adviser import Identified, SpeedAdviser
@@ -145,6 +147,7 @@ class BandDetector:
             root_stiffness=machine.workpiece.stiffness if machine is not None else 0.0,
             alarmed=alarm_age is not None,
             since_alarm=alarm_age or 0,
+            saturated=0 if alarm_age is None else SATURATED,  # it may have grown long ago
             peak_amplitude=0.0,
         )
         self._now = self.state.now[0]
@@ -287,4 +290,6 @@ class BandDetector:
             float(now.cutting),
             float(now.stiffness),
             float(now.cutting_error),
+            # It was steady, or the tool left the cut within the windows.
+            bool(now.saturated >= SATURATED or now.since_break <= now.since_alarm + ONSET),
         )

@@ -27,7 +27,7 @@ _WATCH = 0.75
 _KNOWN, _LINE_KNOWN = HOPS + 32, 1.75
 """Hops after which a cut may be called stable, and, without a machine, times over which the power
 of a line is averaged: chatter that grew before anybody listened is flagged by then."""
-_ONSET = 8
+ONSET = 8
 """Hops before the alarm in which chatter may have begun: an older window has two cuts in it."""
 _CUTS, _PUSHED = 4.0, 32
 """Standard errors from which on a force is one, and hops over which its mean is taken."""
@@ -168,7 +168,7 @@ def write_figures(
     best = -1
     alarmed, since = now.alarmed != 0, now.since_alarm
     for number in range(windows.shape[0]):
-        if alarmed and best >= 0 and WINDOWS[number] > since + _ONSET:
+        if alarmed and best >= 0 and WINDOWS[number] > since + ONSET:
             break
         error = windows[number].growth_error
         if error == error and (best < 0 or error < windows[best].growth_error):

@@ -39,6 +39,7 @@ _LOOKS, _LOOKED_AT = 3, 200
 _KEPT = 0.7
 """Part of the damping, and of the width, of the best speed with which the one that was said before
 is kept to."""
+_HIDDEN = 'grown chatter hides part of the force'
 _RULE_MOST = 3
 """Waves a turn up to which the rule of thumb is tried: of more, fewer were stable than it says."""
 
@@ -71,12 +72,14 @@ class Advice:
             1 otherwise, nan where nothing is known.
         depth_speed_rpm: The speed that goes with the reduced depth, rev/min.
         found_at_rpm: The speed at which the cut chattered that it is for, rev/min.
+        at_best: Whether C w may be more than was heard, and the stable cuts so much fewer.
     """
 
     speeds: tuple[AdvisedSpeed, ...] = ()
     depth_factor: float = math.nan
     depth_speed_rpm: float = math.nan
     found_at_rpm: float = math.nan
+    at_best: bool = False
 
     def after(self, earlier: Advice, depth: float | None = None) -> str:
         """What the operator, who has heard the earlier one, has to hear; empty for nothing.
@@ -102,7 +105,7 @@ class Advice:
             if not known:
                 return bool(self.in_words() and not earlier.in_words())
             return bool(earlier.speeds) or not math.isfinite(earlier.depth_factor)
-        if not earlier.speeds:
+        if not earlier.speeds or earlier.at_best > self.at_best:
             return True
         ratio = self.speeds[0].spindle_speed_rpm / earlier.speeds[0].spindle_speed_rpm
         return abs(ratio - 1.0) > _SAME
@@ -123,6 +126,7 @@ class Advice:
                     tolerance = 50.0 * best.width or 200.0 * _AROUND / (_TRIED - 1)
                     less = '' if best.width else 'less than '
                     expected += f', stable within {less}+-{tolerance:.1f} %'
+                expected += f', at best: {_HIDDEN}' if self.at_best else ''
                 expected += ')'
             if math.isfinite(best.probability):
                 chance = f'stable in {10.0 * best.probability:.0f} of 10 cases'
@@ -133,9 +137,9 @@ class Advice:
         reduced = f'{100.0 * self.depth_factor:.0f} %'
         if depth is not None:
             reduced = f'{1e3 * depth * self.depth_factor:.3f} mm'
-        return (
-            f'no stable speed, reduce the depth to {reduced} at {self.depth_speed_rpm:.0f} rev/min'
-        )
+        further = f', or further: {_HIDDEN}' if self.at_best else ''
+        at = f'at {self.depth_speed_rpm:.0f} rev/min{further}'
+        return f'no stable speed, reduce the depth to {reduced} {at}'
 
 
 def advise(  # noqa: PLR0913 -- what is known of a cut

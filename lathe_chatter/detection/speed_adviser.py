@@ -20,6 +20,8 @@ _WITHIN_REACH = 2.0
 """Times the present speed, that a spindle is taken to reach of which nothing else is known."""
 _CLEAR_CONTACT = 0.15
 """Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
+_EXPLAINS = 2.0
+"""Standard errors by which C w as heard may be more than as told."""
 _VAGUE = 10.0
 """Standard error of the growth rate from which on nothing is recommended, 1/s."""
 
@@ -40,6 +42,7 @@ class Identified(NamedTuple):
         cutting_stiffness: C w, N/m; nan without a model.
         workpiece_stiffness: N/m; nan without a model.
         cutting_error: Standard error of C w, N/m.
+        grown: Whether it grows no more, or the tool may have left the cut: then C w may be more.
     """
 
     growth_rate: float
@@ -49,6 +52,17 @@ class Identified(NamedTuple):
     cutting_stiffness: float
     workpiece_stiffness: float
     cutting_error: float = 0.0
+    grown: bool = False
+
+    def as_told(self, cutting: float) -> Identified:
+        """Of grown chatter that with C w as it is told, N/m; itself where that explains it not.
+
+        C may be told wrong: less than is heard it cannot be, and nothing is known then.
+        """
+        heard, error = self.cutting_stiffness, self.cutting_error
+        if not (self.grown and cutting > heard - _EXPLAINS * error):
+            return self
+        return self._replace(cutting_stiffness=max(cutting, heard), grown=False)
 
 
 @dataclass(frozen=True)
@@ -76,6 +90,11 @@ class AdviceRequest:
         """The same with another range of speeds: itself, with its answer, where it is the same."""
         same = speed_range == self.speed_range
         return self if same else self._changed(speed_range=speed_range)
+
+    def as_told(self, cutting: float) -> AdviceRequest:
+        """With C w as it is told, N/m, if it rests on grown chatter."""
+        known = self.known if self.machine is None else self.known.as_told(cutting)
+        return self if known is self.known else self._changed(known=known)
 
     def at_depth(self, factor: float) -> AdviceRequest | None:
         """For a depth of cut that is so many times as large, nan for unknown: None then."""
@@ -111,7 +130,8 @@ class AdviceRequest:
                 cutting_error=known.cutting_error,
                 advised_rpm=self._advised_before(),
             )
-        return replace(found, found_at_rpm=known.spindle_speed_rpm)
+        at_best = known.grown and self.machine is not None
+        return replace(found, found_at_rpm=known.spindle_speed_rpm, at_best=at_best)
 
     def _advised_before(self) -> float:
         """The speed that was recommended before, rev/min; nan for none."""
@@ -126,7 +146,8 @@ class SpeedAdviser:
 
     Chatter that has grown so far that the tool leaves the cut grows no more, and C w looks less
     than it is: a speed chosen for it would chatter. So an estimate counts only if it is surer
-    than those before, and its growth rate is not clearly below theirs.
+    than those before, and its growth rate is not clearly below theirs; and where nothing is heard
+    but such chatter, C w counts as it is told.
 
     Args:
         machine: Tool, workpiece and bearing; None where nothing is known.
@@ -145,7 +166,7 @@ class SpeedAdviser:
 
     def forget(self) -> None:
         """Begin anew, as with another run."""
-        self._advised_at = math.nan
+        self._advised_at = self._cutting = math.nan
         self.end()
 
     def end(self) -> None:
@@ -180,6 +201,16 @@ class SpeedAdviser:
             self.request = self.request.at_depth(factor)
             self._error = 0.0
 
+    def follow_cutting(self, cutting: float) -> None:
+        """Take C w of what is cut now as it is told, where it cannot be heard.
+
+        Args:
+            cutting: N/m; nan where nobody knows.
+        """
+        self._cutting = cutting
+        if self.request is not None:
+            self.request = self.request.as_told(cutting)
+
     def is_due(self, hops_after_alarm: int) -> bool:
         """Whether a speed is to be recommended now."""
         return hops_after_alarm in _ADVISED_AT
@@ -209,6 +240,7 @@ class SpeedAdviser:
         self._error = error
         self._surely_grew = max(self._surely_grew, growth - error)
         earlier = None if tried else self.request
+        known = known._replace(grown=known.grown or tried).as_told(self._cutting)
         self.request = AdviceRequest(known, self.machine, self.speed_range, earlier)
 
 

@@ -18,12 +18,13 @@ _DEPTH = 'depth_of_cut'
 
 
 class LatheCutWatch:
-    """Tells when the depth of a lathe changes, by how much, and when its bearing contact does.
+    """Tells the depth of cut of a lathe whenever it is another, and when its bearing contact is.
 
     Args:
         node: That wants to know; the lathe is the node `lathe` beside it, remappable like its
             topics.
-        on_depth: Called with the new depth over the one of before; nan where that is not known.
+        on_depth: Called with the depth, m; with nan before where it has changed from one that is
+            not known.
         on_contact: Called when the contact of the bearing is another.
     """
 
@@ -53,6 +54,7 @@ class LatheCutWatch:
     def _take(self, _name: str, values: dict[str, Any]) -> None:
         if isinstance(depth := values.get(_DEPTH), float):
             self._depth = depth
+            self._on_depth(depth)
 
     def _on_event(self, event: ParameterEvent) -> None:
         if event.node != self._lathe:
@@ -60,7 +62,9 @@ class LatheCutWatch:
         for entry in (*event.new_parameters, *event.changed_parameters):
             if entry.name == _DEPTH:
                 before, self._depth = self._depth, float(parameter_value_to_python(entry.value))
+                if math.isnan(before):
+                    self._on_depth(math.nan)
                 if before != self._depth:
-                    self._on_depth(self._depth / before if before > 0.0 else math.nan)
+                    self._on_depth(self._depth)
             elif entry.name == CONTACT:
                 self._on_contact()

@@ -229,8 +229,8 @@ class MonitorNode(ParameterNode):
             self._senders = []
             self._continuity.last = None
 
-    def _follow_depth(self, factor: float) -> None:
-        self._detector.follow_depth(factor)
+    def _follow_depth(self, depth: float) -> None:
+        self._detector.follow_depth(depth)
 
     def _ask(self) -> None:
         if self._asked is not None:

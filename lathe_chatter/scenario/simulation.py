@@ -159,6 +159,7 @@ class _Simulation:
         if len(samples):
             self._run.write(samples)
             if self._detector is not None:
+                self._detector.follow_depth(self._lathe.cut.depth_of_cut)
                 self._on_estimate(self._detector.update(samples, self._lathe.columns))
         return not self._lathe.guard
 

@@ -21,6 +21,10 @@ from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.stability import critical_depth, rightmost_root
 
 _RANGE = (1000.0, 12000.0)
+_SHOP = Machine(
+    Mode(1.2, 2.0 * math.pi * 140.0, 0.04), Mode(8.0, 2.0 * math.pi * 95.0, 0.03), 0.0,
+    cutting_coefficient=1.2e9,
+)  # fmt: skip
 _OPEN = {'bearing_contact': 'none', 'force_noise': 4.5e-4, 'sensor_noise': 1e-7}
 
 
@@ -113,7 +117,8 @@ def test_advice_is_for_the_depth_that_is_told_amid_chatter() -> None:
     before = _watch(detector, lathe, 2.0)[-1].recommended_speed_rpm
     assert _growth(Machine(), before, depth) < 0.0 < _growth(Machine(), before, deeper)
     lathe.retune(lathe.cut.with_changes(depth_of_cut=deeper))
-    detector.follow_depth(deeper / depth)
+    detector.follow_depth(depth)
+    detector.follow_depth(deeper)
     for estimate in _watch(detector, lathe, 2.0):
         assert estimate.chatter
         advice = estimate.advice
@@ -125,6 +130,53 @@ def test_advice_is_for_the_depth_that_is_told_amid_chatter() -> None:
     lathe.retune(lathe.cut.with_changes(depth_of_cut=depth))
     detector.follow_depth(math.nan)
     assert all(each.request is None for each in _watch(detector, lathe, 0.5))
+
+
+def _amid_chatter(seed: int) -> VirtualLathe:
+    """A lathe whose tool leaves the cut for long: 80 % of C w is heard."""
+    cut = Cut(
+        spindle_speed_rpm=1200.0, depth_of_cut=0.12e-3, feed_per_revolution=1e-4, force_noise=0.05
+    )
+    lathe = VirtualLathe(_SHOP, cut, seed=seed)
+    lathe.advance(round(20.0 * lathe.sample_rate))
+    return lathe
+
+
+@pytest.mark.parametrize('told', ['before', 'after', 'too little', 'never'])
+def test_advice_for_chatter_that_grew_before_is_for_the_depth_that_is_told(told: str) -> None:
+    lathe, depth = _amid_chatter(1), 0.12e-3
+    detector = ChatterDetector(_SHOP, speed_range=(200.0, 3500.0))
+    if told in {'before', 'too little'}:
+        detector.follow_depth(depth if told == 'before' else 0.5 * depth)
+    first = next(each for each in _watch(detector, lathe, 2.0) if each.request is not None)
+    if told == 'after':
+        detector.follow_depth(depth)
+    last = _watch(detector, lathe, 2.0)[-1]
+    assert last.cutting_stiffness < 0.85 * _SHOP.cutting_stiffness(depth)
+    best, words = last.advice.speeds[0], last.advice.in_words()
+    true = _growth(_SHOP, best.spindle_speed_rpm, depth)
+    if told in {'before', 'after'}:
+        assert best.growth_rate == pytest.approx(true, abs=0.1)
+        assert 'at best' not in words
+        assert bool(last.advice.after(first.advice)) is (told == 'after')
+    else:
+        assert best.growth_rate < true - 5.0
+        assert words.endswith(', at best: grown chatter hides part of the force)')
+
+
+def test_a_depth_that_is_told_does_not_outweigh_what_is_heard_of_an_onset() -> None:
+    """C may be told wrong, and of chatter that is heard as it begins nothing is hidden."""
+    lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=0.4e-3, **_OPEN))
+    detector = ChatterDetector(speed_range=_RANGE)
+    detector.follow_depth(4e-3)
+    assert not any(estimate.chatter for estimate in _watch(detector, lathe, 3.0))
+    lathe.retune(lathe.cut.with_changes(depth_of_cut=0.8e-3))
+    last = _watch(detector, lathe, 2.0)[-1]
+    assert last.request is not None
+    assert last.request.known.cutting_stiffness == pytest.approx(
+        Machine().cutting_stiffness(0.8e-3), rel=0.1
+    )
+    assert 'at best' not in last.advice.in_words()
 
 
 @pytest.mark.parametrize('after', [0.3, 3.0])
@@ -208,10 +260,11 @@ def test_advice_keeps_to_what_it_said_unless_another_speed_is_clearly_better() -
 def test_however_often_the_depth_changes_one_answer_is_found_for_the_last() -> None:
     lathe = VirtualLathe(cut=Cut(spindle_speed_rpm=3000.0, depth_of_cut=1.1e-3, **_OPEN))
     detector = ChatterDetector(speed_range=_RANGE)
+    detector.follow_depth(1.1e-3)
     request = _watch(detector, lathe, 1.5)[-1].request
     assert request is not None
-    for _ in range(2000):
-        detector.follow_depth(1.0001)
+    for k in range(2000):
+        detector.follow_depth(1.0001 ** (k + 1) * 1.1e-3)
     last = _watch(detector, lathe, 0.01)[-1]
     assert last.request is not None
     assert last.request.earlier is request

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,12 @@ from lathe_chatter.stability import rightmost_root
 BLOCK = 200
 BARE = '{workpiece: {modes: [{frequency: 120 Hz, damping_ratio: 3 %, mass: 20 kg}]}}'
 """A machine file without a bearing."""
+SHOP = """\
+tool: {modes: [{frequency: 140 Hz, damping_ratio: 4 %, mass: 1.2 kg}]}
+workpiece: {modes: [{frequency: 95 Hz, damping_ratio: 3 %, mass: 8 kg}]}
+material: {cutting_coefficient: 1200 MPa}
+spindle: {slowest_speed: 200 rpm, fastest_speed: 3500 rpm}
+"""
 STABLE = Cut(bearing_contact=BearingContact.NONE)
 UNSTABLE = Cut(depth_of_cut=0.001, bearing_contact=BearingContact.NONE)
 FIGURES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
@@ -121,6 +128,27 @@ def test_a_cut_made_deeper_amid_chatter_has_advice_for_its_depth(
     speeds.clear()
     bench.spin_until(lambda: len(speeds) > 20, 'more of it')
     assert all(suits(speed, deeper) for speed in speeds)
+
+
+def test_of_chatter_that_was_there_before_advice_is_for_the_depth_of_the_lathe(
+    start: Callable[..., Any], bench: Bench, tmp_path: Path
+) -> None:
+    file = tmp_path / 'shop.yaml'
+    file.write_text(SHOP)
+    shop = load_machine(file).machine
+    cut = {'spindle_speed_rpm': 1200.0, 'depth_of_cut': 1.2e-4, 'feed_per_revolution': 1e-4}
+    start(LatheNode, machine=str(file), force_noise=0.05, tick_rate=100.0, **cut)
+    blocks = bench.listen(Float64MultiArray, '/lathe/samples')
+    bench.spin_until(lambda: len(blocks) > 500, 'grown chatter')
+    start(MonitorNode, machine=str(file))
+    speeds = bench.listen(Float64, '/chatter_monitor/recommended_speed_rpm')
+
+    def suits() -> bool:
+        """For the force that is heard it would be some 2100 rev/min, where this is -1.8 1/s."""
+        rpm = speeds[-1].data if speeds else 2100.0
+        return rightmost_root(shop, rpm, 1.2e-4, seated=False).real < -5.0
+
+    bench.spin_until(suits, 'advice for the depth')
 
 
 def test_no_rule_of_thumb_is_said_of_a_lathe_that_tells_its_machine(
