@@ -3,10 +3,10 @@
     python benchmarks/page [--seconds 30] [--pairs 5] [--minutes 60] [--simulated 3600] [PART ...]
     python benchmarks/page --output docs pictures
 
-Parts: bare feed files slider lateness memory recorded lines; `bare` is the least that a browser
-takes for two plots, beside which that of the page in `feed` stands. Real nodes over real DDS, a
-real Chromium without a window; processor time from the kernel's accounts. `pictures` takes those
-of the docs.
+Parts: bare feed disk files slider lateness memory recorded lines; `bare` is the least that a
+browser takes for two plots, beside which that of the page in `feed` stands, and `disk` what the
+run takes that is recorded meanwhile. Real nodes over real DDS, a real Chromium without a window;
+processor time from the kernel's accounts. `pictures` takes those of the docs.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from lathe_chatter.cli.bench import this_machine
 PARTS: dict[str, Callable[[Any], Iterator[str]]] = {
     'bare': lambda options: bare.bare(options.seconds),
     'feed': lambda options: live.feed(options.seconds),
+    'disk': lambda options: live.disk(options.seconds),
     'files': lambda _options: files.sizes(),
     'slider': lambda _options: live.slider(),
     'lateness': lambda options: live.lateness(options.seconds, options.pairs),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from ear import Ear, ear
-from processes import LATHE, MONITOR, cpu_seconds, resident, running
+from processes import LATHE, MONITOR, RECORDER, cpu_seconds, resident, running
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from support.browser import Browser
@@ -124,6 +124,22 @@ def taken(pids: list[int]) -> float:
         with contextlib.suppress(OSError):
             total += cpu_seconds(pid)
     return total
+
+
+def disk(seconds: float) -> Iterator[str]:
+    """What a run takes that is recorded as `lathe-chatter run --page` has it, noise and all."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder, 'run')
+        with (
+            running(LATHE, '-p', 'force_noise:=0.001'),
+            running(MONITOR),
+            running(RECORDER, '-p', f'output:={run}'),
+        ):
+            sizes = []
+            for _ in range(2):
+                time.sleep(seconds)
+                sizes.append(sum(file.stat().st_size for file in run.glob('*.mcap')))
+    yield f'a run on disk: {(sizes[1] - sizes[0]) / seconds * 3.6e-6:.2f} GB an hour'
 
 
 def feed(seconds: float) -> Iterator[str]:

@@ -112,6 +112,10 @@ class PageServer:
         port: 0 for any that is free.
         token: That viewers who act need; empty where none is.
 
+    Attributes:
+        port: That it has.
+        url: Of the page, by this machine's name where it listens on all addresses.
+
     Raises:
         StartError: If another host than this one would need no token, or the port is taken.
     """
@@ -135,7 +139,8 @@ class PageServer:
                 f'port {port} of {host} cannot be had: {error.strerror or error}.'
             ) from None
         self.port: int = self._socket.getsockname()[1]
-        self.url = f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
+        name = socket.gethostname() if _is_every_address(host) else host
+        self.url = f'http://{f"[{name}]" if ":" in name else name}:{self.port}/'
         self._source, self._token = source, token
         self.viewers: list[Viewer] = []
         self.operator: Viewer | None = None
@@ -331,6 +336,13 @@ def _is_address(host: str) -> bool:
     with contextlib.suppress(ValueError):
         return bool(ipaddress.ip_address(host))
     return False
+
+
+def _is_every_address(host: str) -> bool:
+    """Whether a host stands for all addresses of this machine, and is none to go to."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host).is_unspecified
+    return not host
 
 
 def _is_loopback(host: str) -> bool:
