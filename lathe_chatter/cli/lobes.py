@@ -152,7 +152,7 @@ def run(options: Namespace) -> int:
     say_what_is_assumed(config.described, screen, config.machine, config.cut)
     for sentence in _doubts(config, limits):
         screen.say(f'WARNING  {sentence}')
-    _show(config, limits, screen)
+    _show(config, limits, top, screen)
     figures = _figures(config, limits, growth)
     if probability is not None and known:
         of_cut = stability_probability(
@@ -379,8 +379,8 @@ def _probable_figures(
     }
 
 
-def _show(config: LatheConfig, limits: SafeLimit, screen: Screen) -> None:
-    """The lowest limits, and what holds at the speed of the cut."""
+def _show(config: LatheConfig, limits: SafeLimit, top: float, screen: Screen) -> None:
+    """The lowest limits, and the highest one that the chart has no room for."""
     names = [('open', limits.open_limit)]
     if config.cut.bearing_contact is not BearingContact.NONE:
         names.append(('on its bearing', limits.seated_limit))
@@ -394,3 +394,7 @@ def _show(config: LatheConfig, limits: SafeLimit, screen: Screen) -> None:
         if high > low:
             where = f'in every lobe from {low:.0f} to {high:.0f} rev/min'
         screen.say(f'lowest limit, {name}: {lowest * 1e3:.4g} mm {where}')
+    depth = np.where(np.isfinite(limits.depth_of_cut), limits.depth_of_cut, 0.0)
+    if depth[k := int(depth.argmax())] > top:
+        where = f'{depth[k] * 1e3:.4g} mm at {limits.spindle_speed_rpm[k]:.0f} rev/min'
+        screen.say(f'highest limit, safe: {where}, above the chart (--depth-limit)')

@@ -38,6 +38,20 @@ def test_lobes_tells_the_limits_as_csv_and_json(
     assert picture.with_suffix('.svg').is_file()
 
 
+def test_a_pocket_that_leaves_the_chart_through_its_top_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ['lobes', '--output', str(tmp_path / 'a.svg'), '--bearing-contact', 'none', '--force']
+    assert cli.main([*call, '--json']) == 0
+    depths = json.loads(capsys.readouterr().out)['safe_depth']
+    assert cli.main(call) == 0
+    (line,) = [each for each in capsys.readouterr().out.splitlines() if 'highest' in each]
+    assert line.startswith(f'highest limit, safe: {max(depths) * 1e3:.4g} mm at ')
+    assert line.endswith(' rev/min, above the chart (--depth-limit)')
+    assert cli.main([*call, '--depth-limit', str(max(depths))]) == 0
+    assert 'highest' not in capsys.readouterr().out
+
+
 def test_a_picture_is_what_its_name_says_and_is_not_overwritten(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
