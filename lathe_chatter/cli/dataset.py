@@ -64,9 +64,12 @@ def run(options: Namespace) -> int:
             with screen.progress('windows', plan.windows) as bar:
                 entries = make_dataset(plan, folder, executor=executor, progress=bar.show)
     except KeyboardInterrupt:
-        there = sum(part.exists() for part in parts)
-        said = f'{there} of {len(parts)} parts are in {folder}'
-        screen.say(f'Interrupted: {said}, and the same call goes on from them.')
+        if there := sum(part.exists() for part in parts):
+            said = f'{there} of {len(parts)} parts are in {folder}'
+            screen.say(f'Interrupted: {said}, and the same call goes on from them.')
+        else:
+            said = 'before the first part was whole, so nothing is kept'
+            screen.say(f'Interrupted {said}: the same call begins again.')
         return INTERRUPTED
     windows, stable = (sum(entry[name] for entry in entries) for name in ('windows', 'stable'))
     screen.say(f'{windows} windows, {stable / max(windows, 1):.1%} of a stable cut.')

@@ -95,14 +95,14 @@ def make_dataset(
     """
     identity = hashlib.sha256(repr(plan).encode()).hexdigest()[:16]
     header = {'kind': 'lathe_chatter data set 2', 'plan': identity, 'code': code_identity()}
-    folder = Path(folder)
-    manifest = folder / MANIFEST
+    folder, manifest = Path(folder), Path(folder) / MANIFEST
     try:
         if folder.is_dir() and not manifest.exists() and any(folder.iterdir()):
             raise DatasetError(f'{folder} holds other files: give another folder.')
         with closing(ResultFile(manifest, header, _known_part)) as file:
             there = {entry['part']: entry for entry in file.entries if _is_there(folder, entry)}
             missing = [[part] for part in parts_of(plan).items() if part[0] not in there]
+            _write(folder / CARD, _card(plan=plan, header=header, parts=[]))
             progress(sum(entry['windows'] for entry in there.values()), plan.windows)
             for done in run_batches(partial(make_part, plan), missing, executor=executor):
                 ((files, entry),) = done.results
@@ -111,14 +111,17 @@ def make_dataset(
                 file.add(there[entry['part']])
                 progress(sum(entry['windows'] for entry in there.values()), plan.windows)
         entries = [there[name] for name in parts_of(plan)]
-        facts = {'plan': plan, 'header': header, 'parts': entries}
-        card = rendered('dataset/card.md.j2', **facts, unit_of=unit_of, table=LATHE)
-        (folder / CARD).write_text(card, encoding='utf-8')
+        _write(folder / CARD, _card(plan=plan, header=header, parts=entries))
         _write(manifest, {'.': _lines([header, *entries])})
     except OSError as error:
         said = f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there'
         raise DatasetError(f'{said} is whole, and the same call goes on from it.') from None
     return entries
+
+
+def _card(**facts: Any) -> Files:
+    """The data card, of a data set that is whole, or before: then without parts."""
+    return {'.': rendered('dataset/card.md.j2', **facts, unit_of=unit_of, table=LATHE).encode()}
 
 
 def _known_part(entry: dict[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,6 +29,30 @@ def test_a_forest_is_right_about_machines_that_it_has_never_seen(tmp_path: Path)
     right, _, constant = second.partition('% right, where always the same answer would be ')
     assert float(right) >= 95.0
     assert float(constant.rstrip('%')) < 70.0
+
+
+def test_the_forest_learns_from_whatever_signals_a_data_set_has(tmp_path: Path) -> None:
+    """Those of the plan that the page on data sets shows, and a force that stands still."""
+    pytest.importorskip('sklearn')
+    pytest.importorskip('pyarrow')
+    page = (EXAMPLE.parents[1] / 'docs' / 'how_to' / 'datasets.md').read_text(encoding='utf-8')
+    (text,) = re.findall('```yaml\n(.*?)```', page, re.DOTALL)
+    for old, new in (
+        ('machines: 200', 'machines: 10'),
+        ('columns: [', 'columns: [cutting_force, '),
+        ('length: 0.1 s', 'length: 0.01 s'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / 'page.yaml').write_text(text, encoding='utf-8')
+    make = [sys.executable, '-m', 'lathe_chatter.cli', 'dataset', 'page.yaml', '--output', 'data']
+    learn = [sys.executable, '-W', 'error', str(EXAMPLE / 'learn_chatter.py'), 'data']
+    subprocess.run(make, cwd=tmp_path, check=True, capture_output=True)
+    done = subprocess.run(learn, cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert '% right, where always the same answer would be' in done.stdout
+    learn[-1] = 'none'
+    done = subprocess.run(learn, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, 'none holds no windows of train.\n')
 
 
 def test_without_scikit_learn_the_forest_says_in_a_sentence_what_it_needs() -> None:

@@ -6,6 +6,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -89,6 +90,11 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     assert told == sorted(told)
     there = {path: path.stat().st_mtime_ns for path in folder.glob('*/part-*')}
     assert 0 < len(there) < 12
+    card = (folder / generation.CARD).read_text(encoding='utf-8')
+    assert '**Not finished.**' in card
+    assert '192 windows of simulated turning' in card
+    assert TEXT.strip() in card
+    assert '| split |' not in card
     # As a power cut may leave it: a part without its line, a line without its part, one cut
     # short, the beginnings of another, and a line that was cut off.
     manifest = folder / generation.MANIFEST
@@ -146,6 +152,8 @@ def test_machines_of_one_split_are_in_no_other_and_the_card_says_so(tmp_path: Pa
     assert f'| train | 6 | {len(own)} | {100.0 * own.mean():.1f} % |' in card
     for name in every:
         assert f'| `{name}` |' in card
+    assert 'Not finished' not in card
+    assert re.search(r'`spindle_speed_rpm` \| rev/min \| .*; at the end of the window \|', card)
 
 
 def test_the_card_holds_the_machine_file_and_says_what_the_samples_do_not_show(
@@ -251,7 +259,7 @@ def test_a_disk_that_is_full_loses_nothing(
 
     def full(path: Path, content: bytes) -> int:
         written.append(path)
-        if len(written) == 5:
+        if len(written) == 6:
             usual(path, content[:100])
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         return usual(path, content)
@@ -290,15 +298,16 @@ def test_the_command_estimates_makes_and_tells(
     assert 'cannot be read: No such file' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('whole', [0, 3])
 def test_an_interrupted_command_says_how_many_parts_are_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    whole: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan_of(tmp_path)
     folder, written = tmp_path / 'data', list[Path]()
     usual = generation._write
 
     def stopping(path: Path, files: generation.Files) -> None:
-        if len(written) == 3:
+        if len(written) == 1 + whole:  # the card is there from the beginning
             raise KeyboardInterrupt
         usual(path, files)
         written.append(path)
@@ -308,7 +317,9 @@ def test_an_interrupted_command_says_how_many_parts_are_there(
         patch.setattr(generation, '_write', stopping)
         assert cli.main(call) == 130
     said = ' '.join(capsys.readouterr().out.split())
-    assert f'Interrupted: 3 of 12 parts are in {folder}, and the same call goes on' in said
+    kept = f': 3 of 12 parts are in {folder}, and the same call goes on from them.'
+    none = ' before the first part was whole, so nothing is kept: the same call begins again.'
+    assert f'Interrupted{kept if whole else none}' in said
     assert all(path.exists() for path in written)
     assert cli.main(call) == 0
     assert len([*folder.glob('*/part-*')]) == 12
