@@ -81,6 +81,7 @@ class SupervisorNode(ParameterNode):
         self._machine: Machine | None = None
         self._no_speed = ''
         self._answer: tuple[Any, float] | None = None
+        self._answered_at = 0.0  # by a clock that began with the machine
         self._newest = 'nothing was done yet'
         self._set = self.create_client(SetParametersAtomically, 'lathe/set_parameters_atomically')
         self._pause = self.create_client(SetBool, 'lathe/pause')
@@ -235,9 +236,17 @@ class SupervisorNode(ParameterNode):
             cutting_stiffness=stiffness,
             tool_frequency=float(heard.get(TOOL_FREQUENCY, math.nan)),
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
+            lasted=self._lasted(now),
             hindrance=self._hindrance(now),
             flag_stays=lambda: self._newest_flag() == flag,
         )
+
+    def _lasted(self, now: float) -> float:
+        """s that the newest change has been in force: from the tick after the answer at latest."""
+        told = self._told[self._lathe]
+        reached = float(self._reports.values(self._lathe, 'pace').get('real-time factor', 1.0))
+        pace = min(reached, float(told.get('real_time_factor') or 1.0), 1.0)
+        return pace * (now - self._answered_at) - 1.0 / float(told.get('tick_rate', math.inf))
 
     def _hindrance(self, now: float) -> str:
         """Why nothing may be done, as the end of a sentence; empty where it may."""
@@ -290,7 +299,7 @@ class SupervisorNode(ParameterNode):
         def answered(done: Any) -> None:
             if self._answer is None or self._answer[0] is not done:
                 return  # given up
-            self._answer = None
+            self._answer, self._answered_at = None, time.monotonic()
             result = done.result()
             result = getattr(result, 'result', result)
             success = getattr(result, 'successful', getattr(result, 'success', False))

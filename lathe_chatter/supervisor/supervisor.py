@@ -34,8 +34,8 @@ _EARLY = 0.1
 """s after a flag in which it is heard whether it fits the machine."""
 _NEAR = 0.25
 """Part of the amplitude limit beyond which growing vibration is not waited on."""
-_STEP, _LONGEST_STEP = 0.02, 0.08
-"""s from one speed of a ramp to the next, and that count at most."""
+_STEP, _LONGEST_STEP = 0.04, 0.08
+"""s that a speed of a ramp lasts at least, and that count at most."""
 _LASTING = 1.0
 """s that a margin must lie below its limit."""
 _SAME = 0.01
@@ -76,6 +76,8 @@ class Seen:
         cutting_stiffness: C w as the monitor identified it, N/m.
         tool_frequency: That the monitor has put in the place of the told one, Hz.
         spindle_acceleration: At which the spindle follows a change, rev/min per s; 0: at once.
+        lasted: s that the newest change of the cut has been in force at least, by the wall's clock
+            and by the lathe's.
         hindrance: Why nothing may be done, as the end of a sentence; empty where it may.
         flag_stays: Whether the flag is as it was, asked once a move has been found: to look for
             one takes up to a second.
@@ -91,6 +93,7 @@ class Seen:
     cutting_stiffness: float = math.nan
     tool_frequency: float = math.nan
     spindle_acceleration: float = 0.0
+    lasted: float = math.inf
     hindrance: str = ''
     flag_stays: Callable[[], bool] = field(default=lambda: True, compare=False)
 
@@ -158,7 +161,7 @@ class Supervisor:
         self._tried: list[Cut] = []
         self._offer: tuple[Cut, Action] | None = None
         self._target = math.nan  # of a ramp under way
-        self._next_step = self._judge_at = -math.inf
+        self._judge_at = -math.inf
         self._at_move, self._settling = math.nan, SETTLING
         self._refusal = self._said = ''
 
@@ -276,21 +279,18 @@ class Supervisor:
         if 0.0 < own <= self.limits.ramp:  # the spindle ramps by itself
             self._judge_at += abs(target - seen.cut.spindle_speed_rpm) / own
             return action
-        self._target, self._next_step = target, seen.time
-        self._reached, self._reached_at = seen.cut.spindle_speed_rpm, seen.time
-        first = self._go_on(seen)
+        self._target, self._reached = target, seen.cut.spindle_speed_rpm
+        first = self._go_on(replace(seen, lasted=min(seen.lasted, _STEP)))
         return replace(action, changes={**action.changes, **(first.changes if first else {})})
 
     def _go_on(self, seen: Seen) -> Action | None:
-        """The next speed of the ramp, if it is due."""
-        if seen.time < self._next_step:
+        """The next speed of the ramp, if the one before has lasted."""
+        if seen.lasted < _STEP:
             return None
-        self._next_step = seen.time + _STEP
         # Where looks come late the ramp takes longer: it has no greater steps for that.
-        step = self.limits.ramp * min(seen.time - self._reached_at + _STEP, _LONGEST_STEP)
+        step = self.limits.ramp * min(seen.lasted, _LONGEST_STEP)
         left = self._target - self._reached
         self._reached += math.copysign(min(step, abs(left)), left)
-        self._reached_at = seen.time + _STEP
         if step >= abs(left):
             self._reached, self._target = self._target, math.nan
             self._judge_at = seen.time + self._settling

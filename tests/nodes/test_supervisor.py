@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Bool, String
@@ -14,6 +16,7 @@ from support.node_bench import LATCHED, Bench
 from support.node_processes import NodeProcesses
 
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.lathe.change_and_knock_sentences import parse_change
 from lathe_chatter.nodes.supervisor_node import SupervisorNode
 
 DEEP = 0.001
@@ -74,6 +77,22 @@ def test_chatter_is_cured_and_every_decision_is_said(cell: Callable[..., Cell]) 
     assert there.get('spindle_speed_rpm') != 3000.0
     (sentence,) = there.heard('I set')
     assert all(words in sentence for words in ('growing at', 'predicted: growth -', 'margin'))
+
+
+@pytest.mark.parametrize('factor', [1.0, 0.3])
+def test_no_step_of_a_move_is_beyond_the_ramp(cell: Callable[..., Cell], factor: float) -> None:
+    there = cell('mode:=act', 'ramp:=2000.0')
+    log = there.bench.listen(Log, '/rosout')
+    there.bench.set_together(LATHE, real_time_factor=factor)
+    there.deepen()
+    there.await_words('The chatter has ended')
+    found = [parse_change(message.msg) for message in log if message.name == 'lathe']
+    steps = [each for each in found if each is not None]
+    assert len(steps) > 3
+    for before, step in pairwise(steps):
+        old, new = (each.get('spindle_speed_rpm', 0.0) for each in (step.old, step.new))
+        # A lathe that wakes late by so much makes the tick of before with the speed of now.
+        assert abs(new - old) <= 2000.0 * (step.time - before.time + 0.01)
 
 
 def test_in_ask_it_waits_until_it_is_accepted(cell: Callable[..., Cell]) -> None:

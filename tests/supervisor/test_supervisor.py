@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import cycle, pairwise
 from typing import Any
 
 import numpy as np
@@ -67,13 +68,14 @@ def test_no_move_is_made_where_the_flag_fell_while_one_was_looked_for() -> None:
     assert there.supervisor.moves == 0
 
 
-def test_the_ramp_is_kept() -> None:
+@pytest.mark.parametrize('late', [0.02, 0.1])
+def test_the_ramp_is_kept_also_where_every_other_step_comes_late(late: float) -> None:
     there = chattering(limits=Limits(ramp=1000.0))
+    latencies = cycle([late, 0.0])
+    there.latency = lambda: next(latencies)
     there.run(2.5)
-    began = there.changed[1][0]
-    for time, cut in there.changed[1:]:
-        gone = abs(cut.spindle_speed_rpm - 3000.0)
-        assert gone <= 1000.0 * (time - began + 0.05)
+    for (before, old), (time, new) in pairwise(there.changed):
+        assert abs(new.spindle_speed_rpm - old.spindle_speed_rpm) <= 1000.0 * (time - before) + 0.1
     assert abs(there.lathe.cut.spindle_speed_rpm - 3000.0) > 300.0
 
 

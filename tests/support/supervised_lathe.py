@@ -15,8 +15,6 @@ from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor
 
 BLOCK = 100
 """Samples from one look to the next: 10 ms."""
-LATENCY = 0.02
-"""s from what is decided to when the lathe does it: a service call and a tick."""
 Disturb = Callable[['SupervisedLathe', Seen], Seen | None]
 """What becomes of what is seen; None: the supervisor does not look."""
 
@@ -46,6 +44,7 @@ class SupervisedLathe:
         actions: All that it said and did, with their times, and what it saw then.
         changed: Every change of the cut, with its time.
         vibration: Of the tool, of each block, m.
+        latency: s from what is decided to when the lathe does it: a service call and a tick.
         refuse: Says why a change is refused; empty where it is not.
         stopped: Whether it had the lathe paused.
         hands: When somebody else changed something and it was told.
@@ -76,6 +75,7 @@ class SupervisedLathe:
         self.actions: list[tuple[float, Action, Seen]] = []
         self.changed: list[tuple[float, Cut]] = []
         self.vibration: list[float] = []
+        self.latency: Callable[[], float] = lambda: 0.02
         self.refuse: Callable[[Action], str] = lambda _action: ''
         self.stopped = False
         self.hands: list[float] = []
@@ -113,6 +113,7 @@ class SupervisedLathe:
         return Seen(
             self.time, self.lathe.cut, known.chatter, known.growth_rate, known.frequency,
             known.amplitude, known.margin, known.cutting_stiffness, known.tool_frequency,
+            lasted=self.time - self.changed[-1][0] if self.changed else math.inf,
         )  # fmt: skip
 
     def accept(self) -> tuple[bool, str]:
@@ -144,7 +145,7 @@ class SupervisedLathe:
             return
         self.actions.append((self.time, action, seen))
         if action.changes or action.stop:
-            self._due.append((self.time + LATENCY, action))
+            self._due.append((self.time + self.latency(), action))
 
     def _carry_out(self, action: Action) -> None:
         if reason := self.refuse(action):
