@@ -256,6 +256,8 @@ class BandDetector:
                 self.adviser.end()
             elif self.adviser.is_due(since := int(now['since_alarm'])):
                 self.adviser.consider(self._identified(), since, modelled=self.believed)
+            else:
+                self.adviser.doubt(float(now.growth), float(now.growth_error), since)
         self._rest = block[count * self.hop :]
 
     def _new_margin(self) -> tuple[float, float]:

@@ -20,8 +20,9 @@ _WITHIN_REACH = 2.0
 """Times the present speed, that a spindle is taken to reach of which nothing else is known."""
 _CLEAR_CONTACT = 0.15
 """Part of k_bc by which k may be off where the bearing carries throughout, or not at all."""
-_EXPLAINS = 2.0
-"""Standard errors by which C w as heard may be more than as told."""
+_SURE = 2.0
+"""Standard errors by which a growth rate is surely one, and C w as heard may be more than as told.
+"""
 _VAGUE = 10.0
 """Standard error of the growth rate from which on nothing is recommended, 1/s."""
 
@@ -60,7 +61,7 @@ class Identified(NamedTuple):
         C may be told wrong: less than is heard it cannot be, and nothing is known then.
         """
         heard, error = self.cutting_stiffness, self.cutting_error
-        if not (self.grown and cutting > heard - _EXPLAINS * error):
+        if not (self.grown and cutting > heard - _SURE * error):
             return self
         return self._replace(cutting_stiffness=max(cutting, heard), grown=False)
 
@@ -214,6 +215,22 @@ class SpeedAdviser:
     def is_due(self, hops_after_alarm: int) -> bool:
         """Whether a speed is to be recommended now."""
         return hops_after_alarm in _ADVISED_AT
+
+    def doubt(self, growth: float, error: float, hops_after_alarm: int) -> None:
+        """Recommend nothing while a cut that was not surely found to grow is surely stable.
+
+        Args:
+            growth: Rate of the newest estimate, 1/s.
+            error: Its standard error, 1/s.
+            hops_after_alarm: While they are few; of chatter that has grown C w looks less.
+        """
+        request = self.request
+        if request is None or request.machine is None or hops_after_alarm > _ADVISED_AT[-1]:
+            return
+        known = request.known
+        unsure = not known.grown and known.growth_rate < _SURE * known.growth_error
+        if unsure and growth < -_SURE * error:
+            self.end()
 
     def consider(self, known: Identified, hops_after_alarm: int, *, modelled: bool) -> None:
         """Recommend from an estimate, if it is better than those before.

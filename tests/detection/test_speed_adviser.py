@@ -294,3 +294,25 @@ def test_another_run_has_nothing_of_what_was_advised_in_the_one_before() -> None
     adviser.forget()
     adviser.consider(unsure, 0, modelled=True)
     assert adviser.request is not None
+
+
+@pytest.mark.parametrize(
+    ('growth', 'newer', 'grown', 'hop', 'stands'),
+    [
+        (1.5, -12.5, False, 2, False),
+        (1.5, -3.0, False, 2, True),  # not surely stable
+        (15.0, -12.5, False, 2, True),  # it surely grew, and is too large for C w to be heard now
+        (1.5, -12.5, True, 2, True),  # likewise
+        (1.5, -12.5, False, 40, True),
+    ],
+)
+def test_nothing_is_recommended_for_a_cut_that_is_found_surely_stable(
+    growth: float, newer: float, grown: bool, hop: int, stands: bool
+) -> None:
+    """A false alarm comes of a short look: 5.4 1/s is its standard error, a moment later 2.1."""
+    known = Identified(growth, 5.4, 137.5, 2795.0, 2.1e5, _SHOP.workpiece.stiffness, 3e4, grown)
+    adviser = SpeedAdviser(_SHOP, (200.0, 3500.0))
+    adviser.consider(known, 0, modelled=True)
+    assert adviser.request is not None
+    adviser.doubt(newer, 2.1, hop)
+    assert (adviser.request is not None) is stands
