@@ -34,6 +34,7 @@ from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
+from lathe_chatter.nodes.supervisor_limits import unsuited
 from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
 from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor
 
@@ -80,6 +81,7 @@ class SupervisorNode(ParameterNode):
         self._cut: Cut | None = None
         self._machine: Machine | None = None
         self._no_speed = ''
+        self._warned_of: set[str] = set()
         self._answer: tuple[Any, float] | None = None
         self._answered_at = 0.0  # by a clock that began with the machine
         self._newest = 'nothing was done yet'
@@ -137,16 +139,18 @@ class SupervisorNode(ParameterNode):
             LatheChatterError: If that machine is none.
         """
         limits, self._no_speed = _limits_of(self.values), ''
-        for name in (self._lathe, self._monitor):
-            file = described_by(self._told.get(name, {}))
-            if file is None or file.speed_range is None:
-                continue
-            speeds = narrowed((limits.slowest_speed, limits.fastest_speed), file.speed_range)
-            if speeds is None:
-                self._no_speed = 'the spindle has no speed from slowest_speed to fastest_speed'
-                return limits
-            return replace(limits, slowest_speed=speeds[0], fastest_speed=speeds[1])
-        return limits
+        files = (described_by(self._told.get(name, {})) for name in (self._lathe, self._monitor))
+        spindle = next((f.speed_range for f in files if f and f.speed_range), None)
+        if self._cut is not None:
+            for sentence in unsuited(limits, self._cut, spindle):
+                if sentence not in self._warned_of:
+                    self._warned_of.add(sentence)
+                    self.get_logger().warning(sentence)
+        speeds = narrowed((limits.slowest_speed, limits.fastest_speed), spindle)
+        if speeds is None:
+            self._no_speed = 'the spindle has no speed from slowest_speed to fastest_speed'
+            return limits
+        return replace(limits, slowest_speed=speeds[0], fastest_speed=speeds[1])
 
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Begin anew with what was set."""

@@ -257,6 +257,12 @@ SAID = {
             'nodes/test_scheduling.py::test_real_time_is_held_while_wanted_and_never_inherited',
         ),
     },
+    'supervisor_limits.py': {
+        'No move passes {}, {} {}, though the lathe has {} {}.': (
+            'its cut, or the spindle of its machine file, is beyond that limit; told once',
+            'nodes/test_supervisor.py::test_limits_that_do_not_suit_the_machine_are_told_once',
+        ),
+    },
     'qos_overrides.py': {
         'keep_last, for a node does not wait for its readers': (
             'a history that keeps all was asked for; the node does not start',

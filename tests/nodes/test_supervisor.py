@@ -176,3 +176,23 @@ def test_limits_that_contradict_each_other_are_refused_at_run_time(
     assert not result.successful
     assert 'fastest_speed' in result.reason
     assert node.values['slowest_speed'] == 1000.0
+
+
+def test_limits_that_do_not_suit_the_machine_are_told_once(
+    nodes: NodeProcesses, start: Callable[..., Any], bench: Bench
+) -> None:
+    node = start(SupervisorNode)
+    log = bench.listen(Log, '/rosout')
+    nodes.start('lathe', 'machine:=chucked_shaft', 'depth_of_cut:=0.00005')
+    wanted = [
+        'No move passes smallest_depth, 0.0001 m, though the lathe has 5e-05 m.',
+        'No move passes slowest_speed, 1000 rev/min, though the lathe has 60 rev/min.',
+    ]
+
+    def warned() -> list[str]:
+        ours = [m.msg for m in log if m.name == node.get_name() and m.msg.startswith('No move')]
+        return sorted(ours, reverse=True)
+
+    bench.spin_until(lambda: len(warned()) >= len(wanted), 'that it says so')
+    assert bench.set_together(SUPERVISOR, hands_off=1.0).successful  # it begins anew
+    assert warned() == sorted(wanted, reverse=True)
