@@ -212,8 +212,7 @@ def _csv(path: Path) -> Iterator[FrequencyResponse]:
     separator = next((mark for mark in (';', '\t', ',') if mark in lines[0][1]), ',')
     rows = [(k, next(csv.reader([line], delimiter=separator))) for k, line in lines]
     head = rows.pop(0)[1]
-    columns: dict[str, int] = {}
-    units: dict[str, str] = {}
+    columns, units = dict[str, int](), dict[str, str]()
     for k, cell in enumerate(head):
         match = re.match(r'\s*(\w+)\s*(?:[(\[]\s*(.*?)\s*[)\]])?\s*$', cell)
         word, unit = (match[1].lower(), match[2] or '') if match else (f'column {k + 1}', '')
