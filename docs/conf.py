@@ -35,7 +35,8 @@ html_static_path = ['_static']
 html_css_files = ['site.css']
 exclude_patterns = ['_build', 'reference/_made', '**/README.*', 'auto_examples/*.ipynb']
 exclude_patterns += ['sg_execution_times.rst', 'auto_examples/sg_execution_times.rst']
-suppress_warnings = ['config.cache']  # the gallery's sorting is a function
+# The gallery's sorting is a function; and a checkout may lie under a path with a space.
+suppress_warnings = ['config.cache', 'sphinx_gallery.space_in_filename']
 
 myst_enable_extensions = ['dollarmath', 'colon_fence']
 myst_heading_anchors = 3
