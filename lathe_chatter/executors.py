@@ -98,7 +98,9 @@ def run_batches(
             for place, batch in itertools.islice(waiting, _AHEAD * width_of(pool)):
                 running[pool.submit(task, batch, **unnamed)] = place
             while running:
-                for future in futures.wait(running, return_when=futures.FIRST_COMPLETED).done:
+                done = futures.wait(running, return_when=futures.FIRST_COMPLETED).done
+                # In order: after a batch that failed none is taken.
+                for future in sorted(done, key=running.__getitem__):
                     here = running.pop(future)
                     for place, batch in itertools.islice(waiting, 1):
                         running[pool.submit(task, batch, **unnamed)] = place
