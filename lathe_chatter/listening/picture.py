@@ -18,6 +18,7 @@ from lathe_chatter.plot_style import (
     new_figure,
     save,
     scale_for,
+    widen,
 )
 from lathe_chatter.samples.columns import UNITS
 
@@ -63,6 +64,7 @@ def draw_judged(
     heard = [(each.time, each.frequency) for each in judged.estimates if each.chatter]
     if heard:
         below.plot(*zip(*heard, strict=True), '.', markersize=2, color=WORKPIECE)
+        widen(below, y=1.0)
     below.set_ylabel('chatter frequency / Hz')
     below.set_xlabel('time / s')
     for axes in (above, below):

@@ -142,6 +142,16 @@ def test_a_picture_has_the_unit_of_its_signal(tmp_path: Path) -> None:
         assert f'>{label}</text>' in path.read_text(encoding='utf-8')
 
 
+def test_a_picture_of_a_steady_frequency_has_plain_numbers(tmp_path: Path) -> None:
+    signals = Signals(('time', 'sound'), np.column_stack([np.arange(100) / 1e4, np.ones(100)]))
+    heard = (Estimate(k / 1e3, 'chatter', chatter=True, frequency=310 + k / 1e3) for k in range(9))
+    path = tmp_path / 'steady.svg'
+    draw_judged(signals, 'sound', Judged(tuple(heard)), [], path)
+    labels = re.findall(r'<text[^>]*>([^<]*)</text>', path.read_text(encoding='utf-8'))
+    assert '310.0' in labels
+    assert not [label for label in labels if re.search(r'\de\d', label)]
+
+
 def test_a_spell_has_the_settled_figures_not_the_first() -> None:
     first = Estimate(1.0, 'chatter', chatter=True, frequency=1001.8, growth_rate=20.9)
     later = [Estimate(1.0 + k / 50, 'chatter', frequency=207.0) for k in range(1, 9)]
