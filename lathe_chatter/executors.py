@@ -64,12 +64,21 @@ def spread(
     Raises:
         WorkerError: If workers are lost, or have another version.
     """
-    batches = batches_of(items, executor)
-    found: list[list[Result]] = [[] for _ in batches]
+    found: dict[int, Result] = {}
+    for batch in spread_out(function, items, executor=executor):
+        found.update(batch)
+        progress(len(batch))
+    return [found[place] for place in range(len(items))]
+
+
+def spread_out(
+    function: Callable[[Item], Result], items: Sequence[Item], *, executor: Executor | None
+) -> Iterator[list[tuple[int, Result]]]:
+    """`spread`, each batch as it comes back: the places of its items, and their results."""
+    places = batches_of(range(len(items)), executor)
+    batches = ([items[place] for place in batch] for batch in places)
     for done in run_batches(function, batches, executor=executor):
-        found[done.place] = done.results
-        progress(len(done.results))
-    return list(itertools.chain.from_iterable(found))
+        yield [*zip(places[done.place], done.results, strict=True)]
 
 
 def batches_of(items: Sequence[Item], executor: Executor | None) -> list[Sequence[Item]]:

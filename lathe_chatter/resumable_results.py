@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 
 from lathe_chatter.code_identity import code_identity
 from lathe_chatter.errors import ResultFileError, reason_of
-from lathe_chatter.executors import Item, Result, batches_of, run_batches
+from lathe_chatter.executors import Item, Result, spread_out
 
 Entry = TypeVar('Entry')
 
@@ -44,7 +44,7 @@ class ResultFile(Generic[Entry]):
         """See the class."""
         self._path = path
         self.entries: list[Entry] = []
-        first = _line(header)
+        first = json_line(header)
         try:
             found = path.read_bytes() if path.exists() else b''
             whole = found[: found.rfind(b'\n') + 1]
@@ -92,7 +92,7 @@ class ResultFile(Generic[Entry]):
             ResultFileError: If it cannot be written.
         """
         try:
-            self._file.write(_line(entry))
+            self._file.write(json_line(entry))
             self._file.flush()
         except OSError as error:
             raise self._not_written(error) from None
@@ -136,14 +136,13 @@ def spread_into(  # noqa: PLR0913 -- what is done, where, and where it is kept
         if found:
             progress(len(found))
         missing = [k for k in range(len(items)) if k not in found]
-        batches = batches_of(missing, executor)
-        wanted = ([items[k] for k in batch] for batch in batches)
-        for done in run_batches(function, wanted, executor=executor):
-            for place, result in zip(batches[done.place], done.results, strict=True):
-                found[place] = result
+        wanted = [items[k] for k in missing]
+        for batch in spread_out(function, wanted, executor=executor):
+            for k, result in batch:
+                found[missing[k]] = result
                 if file:
-                    file.add({'place': place, 'result': result})
-            progress(len(done.results))
+                    file.add({'place': missing[k], 'result': result})
+            progress(len(batch))
     return [found[k] for k in range(len(items))]
 
 
@@ -152,5 +151,6 @@ def _result(count: int, entry: dict[str, Any]) -> tuple[int, Any]:
     return range(count).index(entry['place']), entry['result']
 
 
-def _line(values: Mapping[str, Any]) -> bytes:
+def json_line(values: Mapping[str, Any]) -> bytes:
+    """An object as a line of such a file."""
     return json.dumps(values).encode() + b'\n'

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import json
 import shutil
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import closing, nullcontext
 from functools import partial
@@ -26,7 +25,7 @@ from lathe_chatter.executors import run_batches
 from lathe_chatter.lathe.change_and_knock_sentences import Knock
 from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model.lathe_parameter_table import LATHE
-from lathe_chatter.resumable_results import ResultFile
+from lathe_chatter.resumable_results import ResultFile, json_line
 from lathe_chatter.shipped_files import rendered
 
 ENDINGS = {Form.PARQUET: '.parquet', Form.HDF5: '.h5', Form.ZARR: '.zarr', Form.MCAP: '_runs'}
@@ -112,7 +111,7 @@ def make_dataset(
                 progress(sum(entry['windows'] for entry in there.values()), plan.windows)
         entries = [there[name] for name in parts_of(plan)]
         _write(folder / CARD, _card(plan=plan, header=header, parts=entries))
-        _write(manifest, {'.': _lines([header, *entries])})
+        _write(manifest, {'.': b''.join(map(json_line, [header, *entries]))})
     except OSError as error:
         said = f'{error.filename or folder} cannot be written: {reason_of(error)}; what is there'
         raise DatasetError(f'{said} is whole, and the same call goes on from it.') from None
@@ -126,7 +125,7 @@ def _card(**facts: Any) -> Files:
 
 def _known_part(entry: dict[str, Any]) -> dict[str, Any]:
     """A line of the manifest; a ValueError if it is another."""
-    if ' '.join(entry) != _ENTRY:
+    if entry.keys() != {*_ENTRY.split()}:
         raise ValueError(entry)
     return entry
 
@@ -135,11 +134,6 @@ def _is_there(folder: Path, entry: dict[str, Any]) -> bool:
     """Whether each file of a part has the size that it was written with."""
     files = ((folder / entry['part'] / name, size) for name, (size, _) in entry['files'].items())
     return all(file.is_file() and file.stat().st_size == size for file, size in files)
-
-
-def _lines(values: Iterable[dict[str, Any]]) -> bytes:
-    """JSON, a line each."""
-    return ''.join(f'{json.dumps(value)}\n' for value in values).encode()
 
 
 def _write(path: Path, files: Files) -> None:
@@ -223,7 +217,7 @@ def _write_runs(folder: Path, table: Table, runs: list[DrawnRun], duration: floa
         simulate(scenario, folder / name, knocks=knocks, monitor=False)
     facts = {name: values.tolist() for name, values in table.items() if values.ndim == 1}
     rows = (dict(zip(facts, row, strict=True)) for row in zip(*facts.values(), strict=True))
-    _write(folder / 'truth.jsonl', {'.': _lines(rows)})
+    _write(folder / 'truth.jsonl', {'.': b''.join(map(json_line, rows))})
 
 
 def _read_part(path: Path) -> Table:

@@ -168,11 +168,11 @@ class ChatterDetector:
         for adviser in self._advisers:
             if math.isfinite(before) or math.isnan(depth):
                 adviser.follow_depth(depth / before if before > 0.0 else math.nan)
-            adviser.follow_cutting(self._told_cutting)
+            adviser.follow_cutting(self._cutting_stiffness_told)
         self._take_request()
 
     @property
-    def _told_cutting(self) -> float:
+    def _cutting_stiffness_told(self) -> float:
         """C w as it is told, N/m; nan where nobody tells."""
         return math.nan if self._told is None else self._told.cutting_stiffness(self._depth)
 
@@ -207,7 +207,7 @@ class ChatterDetector:
             self._advisers.insert(0, self._advisers.pop(self._speaker))
         for adviser in self._advisers:
             adviser.judge_with(self._machine)
-            adviser.follow_cutting(self._told_cutting)
+            adviser.follow_cutting(self._cutting_stiffness_told)
         self._advised = False
         self._framer.restart_stretch()
         self._forget_format()
@@ -226,7 +226,7 @@ class ChatterDetector:
             self._prepared, self._mode = (form.rate, mode), mode
             while len(self._advisers) < len(bands):
                 self._advisers.append(SpeedAdviser(self._machine, self._speed_range))
-                self._advisers[-1].follow_cutting(self._told_cutting)
+                self._advisers[-1].follow_cutting(self._cutting_stiffness_told)
             age = ADVISED_LONG_AGO if self._advised else TO_BE_ADVISED
             alarm_age = age if self._estimate.chatter else None
             self._speaker, self._advised, self._known = 0, True, False

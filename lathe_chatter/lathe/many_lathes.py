@@ -11,7 +11,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.executors import batches_of, run_batches
+from lathe_chatter.executors import spread_out
 from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut
@@ -85,11 +85,9 @@ class LatheSweep:
         cut_on = partial(_cut_on, samples=samples, wanted=wanted)
         out = np.empty((len(self), samples, len(wanted)))
         ends: dict[int, tuple[LatheState, Array]] = {}
-        batches = batches_of(self._lathes, executor)
         # What has come is put in its place while the others still cut.
-        for done in run_batches(cut_on, batches, executor=executor):
-            first = done.place * len(batches[0])
-            for place, after in enumerate(done.results, first):
+        for batch in spread_out(cut_on, self._lathes, executor=executor):
+            for place, after in batch:
                 ends[place], out[place] = (after.state, after.last), after.samples
         for place, (state, last) in ends.items():
             lathe = self._lathes[place].lathe

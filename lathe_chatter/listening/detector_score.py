@@ -149,7 +149,7 @@ def read_labels(path: Path) -> list[Label]:
         for before, other in found.items():
             if other.state != label.state and max(other[0], label[0]) < min(other[1], label[1]):
                 raise SignalFileError(
-                    f'{path}: row {before} ({_told(other)}) and row {number} ({_told(label)}) '
+                    f'{path}: row {before} ({_as_row(other)}) and row {number} ({_as_row(label)}) '
                     'overlap: at one time there is one state.'
                 )
         found[number] = label
@@ -168,15 +168,15 @@ def labels_beyond(labels: Sequence[Label], signals: Signals) -> list[str]:
     lasts = f'the recording, which lasts from {begin:.6g} to {end:.6g} s'
     for label in labels:
         if label.end <= begin or label.start >= end:
-            raise SignalFileError(f'The label {_told(label)} must lie in {lasts}.')
+            raise SignalFileError(f'The label {_as_row(label)} must lie in {lasts}.')
     return [
-        f'The label {_told(label)} reaches beyond {lasts}: only what is in it is scored.'
+        f'The label {_as_row(label)} reaches beyond {lasts}: only what is in it is scored.'
         for label in labels
         if label.start < begin - _BLOCK or label.end > end + _BLOCK
     ]
 
 
-def _told(label: Label) -> str:
+def _as_row(label: Label) -> str:
     return f'{label.start:g},{label.end:g},{label.state}'
 
 

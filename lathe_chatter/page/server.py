@@ -126,7 +126,8 @@ class PageServer:
             raise StartError(
                 f'token has {len(token)} characters: it must have {_SHORTEST_TOKEN} or more.'
             )
-        if not (token or _is_loopback(host)):
+        address = _in_digits(host)
+        if not (token or host == 'localhost' or (address and address.is_loopback)):
             raise StartError(
                 f'host {host} lets other machines in: give a token of 16 characters or more, '
                 'which those who act will need.'
@@ -139,7 +140,8 @@ class PageServer:
                 f'port {port} of {host} cannot be had: {error.strerror or error}.'
             ) from None
         self.port: int = self._socket.getsockname()[1]
-        name = socket.gethostname() if _is_every_address(host) else host
+        everywhere = address.is_unspecified if address else not host
+        name = socket.gethostname() if everywhere else host
         self.url = f'http://{f"[{name}]" if ":" in name else name}:{self.port}/'
         self._source, self._token = source, token
         self.viewers: list[Viewer] = []
@@ -318,7 +320,7 @@ class _Guard:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         host = urlsplit(f'//{Headers(scope=scope).get("host", "")}').hostname or ''
         astray = scope['type'] == 'websocket' and scope['path'] != '/feed'
-        if astray or (host not in self._names and not _is_address(host)):
+        if astray or (host not in self._names and not _in_digits(host)):
             text = f'There is nothing for {host!r:.80} here.\n'
             await PlainTextResponse(text, 403)(scope, receive, send)
             return
@@ -331,24 +333,11 @@ class _Guard:
         await self._app(scope, receive, send_with_headers)
 
 
-def _is_address(host: str) -> bool:
-    """Whether a host is an address in digits: no foreign name leads here by it."""
+def _in_digits(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """A host that is an address in digits: no foreign name leads here by it."""
     with contextlib.suppress(ValueError):
-        return bool(ipaddress.ip_address(host))
-    return False
-
-
-def _is_every_address(host: str) -> bool:
-    """Whether a host stands for all addresses of this machine, and is none to go to."""
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host).is_unspecified
-    return not host
-
-
-def _is_loopback(host: str) -> bool:
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host).is_loopback
-    return host == 'localhost'
+        return ipaddress.ip_address(host)
+    return None
 
 
 def free_port(first: int = 8080) -> int:

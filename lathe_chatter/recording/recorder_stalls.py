@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lathe_chatter.recording.provenance import LONGEST_STALL, STALLS
 
-_STALL = 0.1
+STALL = 0.1
 """s between two times that messages are taken which count as a stall; usual are 0.04 s."""
 
 
@@ -27,7 +27,7 @@ class ReceiveStalls:
         if self._last is not None:
             passed = now - self._last
             self.longest = max(self.longest, passed)
-            self.count += passed > _STALL
+            self.count += passed > STALL
         self._last = now
 
     def values(self) -> dict[str, str]:

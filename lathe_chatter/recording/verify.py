@@ -28,6 +28,7 @@ from lathe_chatter.recording.provenance import (
     noted_pauses,
 )
 from lathe_chatter.recording.recorded_file import Note, offered_qos
+from lathe_chatter.recording.recorder_stalls import STALL
 from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification_result import Finding, SampleCount, Verification
@@ -252,8 +253,8 @@ def _check_reception(
                 times = 'once' if heard == 1 else f'{heard} times'
                 longest = note.values.get(LONGEST_STALL, 'an unknown number of')
                 found.remark(
-                    f'The recorder took no messages for more than 0.1 s {times}, for {longest} s '
-                    'at most; what was lost by it, if anything, is told by topic.'
+                    f'The recorder took no messages for more than {STALL:g} s {times}, '
+                    f'for {longest} s at most; what was lost by it, if anything, is told by topic.'
                 )
             if not isinstance(heard, dict):
                 continue

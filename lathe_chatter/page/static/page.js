@@ -21,7 +21,12 @@ function forget() {
   cell = {};
   trail = [];
   signals = null;
-  envelopes = WINDOWS.map(() => ({next: 0, times: [], values: [...SIGNALS, ...SIGNALS].map(() => [])}));
+  envelopes = noEnvelopes();
+}
+
+// Of each signal the smallest values, then of each the largest.
+function noEnvelopes() {
+  return WINDOWS.map(() => ({next: 0, times: [], values: [...SIGNALS, ...SIGNALS].map(() => [])}));
 }
 
 const worded = name => name.replace(/_rpm$/, '').replaceAll('_', ' ');
@@ -297,7 +302,7 @@ function describeScenario() {
 
 function takeSignals(news, arrays) {
   if (signals && signals.epoch !== news.epoch) {
-    envelopes = WINDOWS.map(() => ({next: 0, times: [], values: [...SIGNALS, ...SIGNALS].map(() => [])}));
+    envelopes = noEnvelopes();
     trail = [];
     document.querySelectorAll('.refusal').forEach(each => { each.textContent = ''; });
     signals = news;
