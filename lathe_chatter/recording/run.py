@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -121,13 +121,18 @@ class Run:
                 raise RunReadError(f'{self.path}: {found}')
 
     def sample_blocks(
-        self, topic: str | None = None, columns: Iterable[str] | None = None
+        self,
+        topic: str | None = None,
+        columns: Iterable[str] | None = None,
+        received: Sequence[tuple[int, int]] = (),
     ) -> Iterator[SampleBlocks]:
         """The samples of a lathe as they were recorded, some 4 s at a time.
 
         Args:
             topic: Of the samples; may be left out where the run has one lathe.
             columns: Which signals besides the time; all by default.
+            received: If given, what was received outside of these spans, ns since the epoch, may
+                be left out: a few seconds of a long run are there at once.
 
         Raises:
             RunReadError: If a file is damaged, or there are several lathes and no topic is named.
@@ -136,7 +141,7 @@ class Run:
         name = topic or self.samples_topic()
         wanted = None if columns is None else tuple(columns)
         for file in self.opened:
-            yield from sample_blocks(file, name, wanted)
+            yield from sample_blocks(file, name, wanted, received)
 
     def samples(
         self,

@@ -7,7 +7,7 @@ by that, and other messages by the blocks of samples about which they were writt
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -106,6 +106,13 @@ class Timeline:
                 return received, published
             offset = int(self.offsets[0])
         return received, min(raw.publish_time - offset, received)
+
+    def received_in(self, spans: Sequence[tuple[float, float]]) -> list[tuple[int, int]]:
+        """Between which stamps the samples of some spans of simulated time, s, were received."""
+        stamps = self.received + self.offsets
+        until = np.append(stamps[1:], np.iinfo(np.int64).max)  # a run may grow while it is read
+        found = [(self.last >= begin) & (self.first <= end) for begin, end in spans]
+        return [(int(stamps[k].min()), int(until[k].max())) for k in found if k.any()]
 
     def block_at(self, published: int) -> int:
         """The first block that was published at a time (ns, without steps) or after it.

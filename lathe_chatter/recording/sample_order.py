@@ -13,11 +13,11 @@ import numpy as np
 from lathe_chatter.array_types import Array
 from lathe_chatter.recording.recorded_file import RecordedFile
 from lathe_chatter.recording.sample_blocks import SampleBlocks
-from lathe_chatter.recording.sample_reader import as_received, as_written
+from lathe_chatter.recording.sample_reader import Spans, as_received, as_written
 
 
 def sample_blocks(
-    file: RecordedFile, topic: str, wanted: Sequence[str] | None = None
+    file: RecordedFile, topic: str, wanted: Sequence[str] | None = None, received: Spans = ()
 ) -> Iterator[SampleBlocks]:
     """The samples of a topic in a file, some 4 s at a time.
 
@@ -27,13 +27,14 @@ def sample_blocks(
         file: Which.
         topic: Of the samples.
         wanted: Columns, in any order, besides the time; all where None.
+        received: If given, what was received outside of these spans may be left out.
 
     Raises:
         OSError: If the file cannot be read.
         LayoutError: If a message is no block of samples.
     """
     if file.in_time_order:
-        for blocks in as_written(file, topic, wanted):
+        for blocks in as_written(file, topic, wanted, received):
             # What is out of order is so within a chunk, and no chunk is halved here.
             in_order = (blocks.log_times[1:] >= blocks.log_times[:-1]).all()
             yield blocks if in_order else _better(blocks)

@@ -23,12 +23,14 @@ from lathe_chatter.recording.sample_blocks import (
 )
 from lathe_chatter.samples.codec import BlockLayout, block_layout
 
+Spans = Sequence[tuple[int, int]]
+"""From when to when, log times, ns."""
 _FIXED = 11
 """Bytes of a message's head that are the same in all of a channel: opcode, length, channel."""
 
 
 def as_written(
-    file: RecordedFile, topic: str, wanted: Sequence[str] | None
+    file: RecordedFile, topic: str, wanted: Sequence[str] | None, received: Spans = ()
 ) -> Iterator[SampleBlocks]:
     """The samples of a topic in a file in the order of the file, some 4 s at a time.
 
@@ -36,6 +38,7 @@ def as_written(
         file: Which.
         topic: Of the samples.
         wanted: Columns, in any order, besides the time; all where None.
+        received: If given, what was received outside of these spans may be left out.
 
     Raises:
         OSError: If the file cannot be read.
@@ -44,7 +47,7 @@ def as_written(
     numbers = file.channels_of(topic)
     sizes = _index_sizes(file, topic, numbers[0]) if len(numbers) == 1 else []
     if sizes:
-        yield from _IndexedReader(file, numbers[0], sizes, wanted).blocks()
+        yield from _IndexedReader(file, numbers[0], sizes, wanted).blocks(received)
         return
     joiner = BlockJoiner(wanted)
     for chunk, contents in enumerate(file.contents(), 1):
@@ -131,15 +134,18 @@ class _IndexedReader:
         self._file, self._channel, self._sizes, self._wanted = file, channel, sizes, wanted
         self._buffer = bytearray()  # to be given fresh pages costs more than to read
         self._usual: _Usual | None = None
-        self._apart = 0, b''  # a size of messages, and offsets at which they do not overlap
+        # A size of messages, offsets at which they do not overlap, and the distance of these.
+        self._apart = 0, b'', 0
 
-    def blocks(self) -> Iterator[SampleBlocks]:
-        """All samples of the channel; what is damaged is told."""
+    def blocks(self, received: Spans) -> Iterator[SampleBlocks]:
+        """The samples of the channel, as in `as_written`; what is damaged is told."""
         joiner = BlockJoiner(self._wanted)
         descriptor = os.open(self._file.path, os.O_RDONLY)
         try:
             chunks = zip(self._file.known.chunks, self._sizes, strict=True)
             for count, (place, size) in enumerate(chunks, 1):
+                if received and not any(a <= place.last and b >= place.first for a, b in received):
+                    continue
                 chunk = read_chunk(self._file.path, partial(self._read, descriptor), place)
                 damage = chunk if isinstance(chunk, Damage) else self._take(chunk, size, joiner)
                 if damage or count % AT_ONCE == 0:
@@ -181,13 +187,18 @@ class _IndexedReader:
             return None
         count = size // 16
         offsets = np.frombuffer(index, '<i8')[1::2]
-        if self._apart != (usual.size, offsets.tobytes()):
-            if offsets[0] < 0 or (offsets[1:] - offsets[:-1] < usual.size).any():
+        if self._apart[:2] != (usual.size, told := offsets.tobytes()):
+            apart = np.diff(offsets)
+            if offsets[0] < 0 or (apart < usual.size).any():
                 return None
-            self._apart = usual.size, offsets.tobytes()
+            even = count > 1 and apart.min() == apart.max()
+            self._apart = usual.size, told, int(apart[0]) if even else 0
         if offsets[-1] > len(chunk.records) - usual.size:
             return None
-        memory, first, stride = evenly_spaced(chunk.records, offsets, usual.size)
+        memory: bytes | NDArray[np.uint8] = chunk.records
+        first, stride = int(offsets[0]), self._apart[2]
+        if not stride:
+            memory, first, stride = evenly_spaced(chunk.records, offsets, usual.size)
         heads: NDArray[Any] = np.ndarray((count,), usual.dtype, memory, first, (stride,))
         if heads['fixed'].tobytes() != usual.fixed * count:
             return None

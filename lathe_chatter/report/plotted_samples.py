@@ -14,6 +14,8 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.samples.continuity import Continuity
 from lathe_chatter.samples.extremes import TIME, Extremes
 
+Spans = Sequence[tuple[float, float]]
+"""Begin and end of each, s."""
 _AT_ONCE = 50_000
 """Samples that are looked at together: more would only take more memory."""
 
@@ -34,7 +36,8 @@ class RunSamples:
     """Samples that pass by once when this is made, and once more for each call of `between`.
 
     Args:
-        blocks: Gives all blocks from the first on, at each call.
+        blocks: Gives all blocks from the first on, at each call; those outside of some spans of
+            simulated time, s, may be left out where such are given.
 
     Attributes:
         count: Of the samples.
@@ -46,13 +49,13 @@ class RunSamples:
         extremes: Of all signals.
     """
 
-    def __init__(self, blocks: Callable[[], Iterable[SampleBlocks]]) -> None:
+    def __init__(self, blocks: Callable[[Spans], Iterable[SampleBlocks]]) -> None:
         """Let them pass by."""
         self._blocks = blocks
         self.first = 0.0
         continuity = Continuity(remember=True)
         self.extremes = Extremes.none((TIME,))
-        for block in blocks():
+        for block in blocks(()):
             samples, columns = block.samples, tuple(block.columns)
             if not len(samples):
                 continue
@@ -72,9 +75,9 @@ class RunSamples:
         """Of signals (n,) by name that are in memory already."""
         samples = np.column_stack(list(signals.values()))
         block = _InMemory(tuple(signals), samples)
-        return cls(lambda: [block])
+        return cls(lambda _spans: [block])
 
-    def between(self, spans: Sequence[tuple[float, float]]) -> list[dict[str, Array]]:
+    def between(self, spans: Spans) -> list[dict[str, Array]]:
         """Every sample within some spans of simulated time: after the begin, up to the end.
 
         Of a span with a gap in it, what comes after the last gap: what is computed from the
@@ -89,7 +92,7 @@ class RunSamples:
         whole = [(self._after_gaps(begin, end), end) for begin, end in spans]
         parts: list[list[Array]] = [[] for _ in spans]
         columns = self.extremes.columns
-        for block in self._blocks():
+        for block in self._blocks(whole):
             names = tuple(block.columns)
             times = block.samples[:, names.index(TIME)]
             if not len(times):

@@ -35,7 +35,7 @@ from lathe_chatter.recording.recorded_cuts import LOG, RecordedCuts, message_of,
 from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.report.monitor_record import Flag, MonitorRecord
-from lathe_chatter.report.plotted_samples import RunSamples
+from lathe_chatter.report.plotted_samples import RunSamples, Spans
 
 _REASONS = {
     BEGINNING: 'the lathe was started again',
@@ -271,7 +271,7 @@ def read_history(path: Path, topic: str | None = None) -> History:
         path=Path(path),
         machine=first.machine,
         start=first.start,
-        samples=RunSamples(lambda: _on_one_axis(run, topic, cuts, sessions)),
+        samples=RunSamples(lambda spans: _on_one_axis(run, topic, cuts, sessions, spans)),
         changes=[event for event in events if isinstance(event, Change)],
         knocks=[event for event in events if isinstance(event, Knock)],
         flags=monitor.flags(estimates),
@@ -305,11 +305,11 @@ def _sessions(cuts: RecordedCuts) -> list[Session]:
 
 
 def _on_one_axis(
-    run: Run, topic: str, cuts: RecordedCuts, sessions: list[Session]
+    run: Run, topic: str, cuts: RecordedCuts, sessions: list[Session], spans: Spans
 ) -> Iterator[SampleBlocks]:
-    """The samples with times that go on from session to session."""
+    """The samples with times that go on from session to session, at least those of some spans."""
     if len(sessions) == 1:
-        yield from run.sample_blocks(topic)
+        yield from run.sample_blocks(topic, None, cuts.timeline.received_in(spans))
         return
     starts = [recorded.blocks.start for recorded in cuts.sampled]
     begins = np.array([session.time for session in sessions])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lathe_chatter.lathe import VirtualLathe
@@ -41,6 +42,7 @@ from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 TICK = 20
 PERIOD = 2_000_000
 """ns between two blocks: real time."""
+PER_COMMIT = 50
 START = 1_700_000_000_000_000_000
 FLAG = '/chatter_monitor/chatter'
 
@@ -97,11 +99,13 @@ class Record:
         self.add(FLAG, message_bytes('std_msgs/msg/Bool', data=up))
 
     def cut(self, lathe: VirtualLathe, ticks: int, *, keep: bool = True) -> None:
-        for _ in range(ticks):
+        for tick in range(1, ticks + 1):
             samples = lathe.advance(TICK)
             self.now += PERIOD
             if keep:
                 self.add('/lathe/samples', encode_block(samples))
+            if tick % PER_COMMIT == 0:
+                self.writer.commit_soon()
 
     def change(self, lathe: VirtualLathe, *, logged: bool = True, **values: float) -> None:
         cut = lathe.cut.with_changes(**values)
@@ -150,6 +154,11 @@ def test_a_step_of_the_clock_moves_nothing_and_is_told(
     assert [round(flag.time, 3) for flag in history.flags] == [1.3, 2.1]
     assert [change.time for change in history.changes] == [1.0, 2.1]
     assert history.duration == pytest.approx(2.2)
+    # To look at a moment closely, no more than the chunks about it are read, by their stamps.
+    spans = [(0.5, 0.52), (1.15, 1.25), (2.19, 2.3)]
+    for (begin, end), excerpt in zip(spans, history.samples.between(spans), strict=True):
+        wanted = np.arange(round(begin * 1e4) + 1, min(round(end * 1e4), 22_000) + 1)
+        assert np.rint(1e4 * excerpt['time']).tolist() == wanted.tolist()
     (steps,) = [cuts_of(tmp_path / 'run').timeline.steps]
     if noted or step < 0.0:
         ((time, seconds),) = steps

@@ -78,6 +78,15 @@ def test_a_range_of_time_is_cut_out(folder: Path, samples: Array) -> None:
     assert found.columns['time'].tolist() == inside.tolist()
 
 
+def test_chunks_outside_of_a_span_of_reception_are_passed_by(folder: Path, samples: Array) -> None:
+    begin, end = 2345, 2455
+    spans = [(START + begin * 500_000, START + end * 500_000)]
+    found = list(read_run(folder).sample_blocks(received=spans))
+    numbers = np.concatenate([(each.log_times - START) // 500_000 for each in found]).tolist()
+    assert numbers == [*range(2300, 2500)]
+    assert np.array_equal(np.concatenate([e.samples for e in found]), samples[11500:12500])
+
+
 def test_a_damaged_message_index_leads_nobody_astray(
     folder: Path, samples: Array, tmp_path: Path
 ) -> None:

@@ -30,7 +30,7 @@ def signal(count: int, start: float = 0.0) -> Array:
 
 def test_the_extremes_are_those_of_all_samples() -> None:
     samples = signal(100_003)
-    passed = RunSamples(lambda: blocks(np.array_split(samples, 37)))
+    passed = RunSamples(lambda _spans: blocks(np.array_split(samples, 37)))
     assert (passed.count, passed.first, passed.last) == (100_003, 0.001, samples[-1, 0])
     assert not passed.gaps
     low, high = passed.extremes.of('force')
@@ -51,7 +51,7 @@ def test_a_short_signal_is_kept_as_it_is() -> None:
 @pytest.mark.parametrize('count', [400, 40_000])
 def test_nothing_is_joined_over_a_gap(count: int) -> None:
     parts = [signal(count), signal(count, start=100.0), signal(count, start=50.0)]
-    passed = RunSamples(lambda: blocks(parts))
+    passed = RunSamples(lambda _spans: blocks(parts))
     ends = [part[-1, 0] for part in parts]
     assert passed.gaps == [(ends[0], 100.001)]
     assert passed.restarts == [(ends[1], 50.001)]
@@ -65,7 +65,7 @@ def test_nothing_is_joined_over_a_gap(count: int) -> None:
 
 def test_more_gaps_than_dots_do_not_fill_the_memory() -> None:
     parts = [signal(20, start=0.1 * k) for k in range(20_000)]
-    passed = RunSamples(lambda: blocks(parts))
+    passed = RunSamples(lambda _spans: blocks(parts))
     assert len(passed.gaps) == 19_999
     assert len(passed.extremes.low) <= 4096
     every = np.concatenate(parts)
@@ -74,7 +74,7 @@ def test_more_gaps_than_dots_do_not_fill_the_memory() -> None:
 
 def test_spans_are_every_sample_after_their_begin_up_to_their_end() -> None:
     samples = signal(10_000)
-    passed = RunSamples(lambda: blocks(np.array_split(samples, 11)))
+    passed = RunSamples(lambda _spans: blocks(np.array_split(samples, 11)))
     first, second = passed.between([(0.0, 0.25), (8.9985, 9.3)])
     assert np.array_equal(first['time'], samples[:250, 0])
     assert np.array_equal(second['force'], samples[8998:9300, 1])
