@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import resource
+import statistics
 import subprocess
 import sys
 import time
@@ -18,6 +19,9 @@ from lathe_chatter.recording import RunWriter, read_run
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.scenario import Scenario
 from lathe_chatter.scenario.simulation import simulate
+
+_TIMES = 7
+"""That a run is read."""
 
 
 def writing() -> None:
@@ -135,15 +139,25 @@ def _peak_memory(pid: int) -> float:
 
 
 def read_here(run: str, columns: str) -> None:
-    """Read columns of a run, and say what it took."""
+    """Read columns of a run some times, and say what it took.
+
+    The first time the system gives the process its memory, page by page: in a virtual machine that
+    may take longer than all else.
+    """
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    began, busy = time.perf_counter(), time.process_time()
-    found = read_run(run).samples(columns=columns.split(','))
-    taken, busy = time.perf_counter() - began, time.process_time() - busy
-    memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e6
+    taken, busy, memory, found = [], [], 0.0, None
+    for _ in range(_TIMES):
+        del found
+        began, busy_before = time.perf_counter(), time.process_time()
+        found = read_run(run).samples(columns=columns.split(','))
+        taken.append(time.perf_counter() - began)
+        busy.append(time.process_time() - busy_before)
+        memory = memory or (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e6
+    assert found is not None  # noqa: S101 -- for the types
     size = len(next(iter(found.columns.values())))
     print(
         f'reading: {size / 1e6:.0f} million samples, {len(found.columns)} columns, in '
-        f'{taken:.2f} s ({busy:.2f} s of processor time) with '
-        f'{memory:.2f} GB more than before, gaps {len(found.gaps)}'
+        f'{statistics.median(taken):.2f} s ({statistics.median(busy):.2f} s of processor time; '
+        f'medians of {_TIMES}, at first {taken[0]:.2f} and {busy[0]:.2f}) with {memory:.2f} GB '
+        f'more than before, gaps {len(found.gaps)}'
     )
