@@ -22,6 +22,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite.binding.module import ModuleRef
+from numba.core import event
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler import Flags
 from numba.core.registry import CPUDispatcher
@@ -113,6 +114,30 @@ class _Definitions(ModuleRef):  # type: ignore[misc]  # llvmlite has no types
     @property
     def functions(self) -> Any:
         return (each for each in super().functions if not each.is_declaration)
+
+
+@contextmanager
+def before_compiling(begin: Callable[[], object]) -> Iterator[None]:
+    """Call a function once, when something turns out not to be compiled yet."""
+    listener = _FirstCompilation(begin)
+    event.register('numba:compile', listener)
+    try:
+        yield
+    finally:
+        event.unregister('numba:compile', listener)
+
+
+class _FirstCompilation(event.Listener):  # type: ignore[misc]  # Numba has no types
+    def __init__(self, begin: Callable[[], object]) -> None:
+        self._begin: Callable[[], object] | None = begin
+
+    def on_start(self, _event: object) -> None:
+        begin, self._begin = self._begin, None
+        if begin is not None:
+            begin()
+
+    def on_end(self, _event: object) -> None:
+        pass
 
 
 def compiled(  # noqa: PLR0913 -- one keyword for each fact about a function

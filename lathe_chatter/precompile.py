@@ -13,8 +13,8 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
-from numba.core import event
 
+from lathe_chatter.compiled import before_compiling
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.cut_identification import cutting_limit, mechanics_of
 from lathe_chatter.lathe import VirtualLathe
@@ -52,34 +52,17 @@ def precompile(*parts: str, say: Callable[[str], object] = lambda _sentence: Non
             for part in wanted[1:]
         )
 
-    first_compilation = _FirstCompilation(begin)
-    event.register('numba:compile', first_compilation)
     try:
-        for number, part in enumerate(wanted):
-            if number == 1:
-                for helper in helpers:
-                    helper.wait()
-            _PARTS[part]()
+        with before_compiling(begin):
+            for number, part in enumerate(wanted):
+                if number == 1:
+                    for helper in helpers:
+                        helper.wait()
+                _PARTS[part]()
     finally:
-        event.unregister('numba:compile', first_compilation)
         for helper in helpers:
             helper.terminate()
             helper.wait()
-
-
-class _FirstCompilation(event.Listener):  # type: ignore[misc]  # Numba has no types
-    """Calls a function once, when Numba begins to compile what it found nowhere."""
-
-    def __init__(self, begin: Callable[[], None]) -> None:
-        self._begin: Callable[[], None] | None = begin
-
-    def on_start(self, _event: object) -> None:
-        begin, self._begin = self._begin, None
-        if begin is not None:
-            begin()
-
-    def on_end(self, _event: object) -> None:
-        pass
 
 
 def _cut() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from lathe_chatter.compiled import _bases, _cache_folder, compiled
+from lathe_chatter.compiled import _bases, _cache_folder, before_compiling, compiled
 from lathe_chatter.precompile import precompile
 
 WATCH = """
@@ -99,6 +99,14 @@ def test_an_inner_function_refuses_a_call_from_python() -> None:
 
     with pytest.raises(TypeError, match='twice is called by compiled functions only'):
         twice(1.0)
+
+
+def test_compiling_is_said_before_and_once() -> None:
+    twice, said = numba.njit(lambda number: 2 * number), list[int]()
+    for _ in range(2):
+        with before_compiling(lambda: said.append(len(twice.overloads))):
+            assert twice(1) + twice(0.5) == 3.0
+    assert said == [0]
 
 
 def test_what_is_compiled_is_said_nothing_of() -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from lathe_chatter.errors import LatheChatterError
@@ -17,6 +18,10 @@ from lathe_chatter.recording.run_writer import RunWriter
 
 SUMMARY = 'lathe_chatter/summary'
 """Name of the record; every value is JSON."""
+_COMPILING = (
+    'All messages are on disk; for the closing summary something is compiled, once for each '
+    'installation: half a minute at most ...'
+)
 
 
 def note_end(
@@ -24,6 +29,7 @@ def note_end(
     log: RunLog,
     parameters: Mapping[str, Sequence[tuple[Mapping[str, Any], int]]],
     ended_early: str = '',
+    say: Callable[[str], object] = lambda _sentence: None,
 ) -> None:
     """Note what a run holds, and what happened, before it is closed.
 
@@ -32,13 +38,21 @@ def note_end(
         log: Of the run.
         parameters: As for `closing_summary`.
         ended_early: Why it has not all that it was to have, a sentence; else empty.
+        say: Is told in a sentence where it takes long.
 
     Raises:
         OSError: If the disk refuses.
     """
     if ended_early:
         writer.note(ENDED_EARLY, {'reason': ended_early})
-    writer.note(SUMMARY, closing_summary(log, parameters))
+    told: AbstractContextManager[None] = nullcontext()
+    if log.samples:
+        # Not at the top: a recorder would load Numba at its start.
+        from lathe_chatter.compiled import before_compiling
+
+        told = before_compiling(lambda: say(_COMPILING))
+    with told:
+        writer.note(SUMMARY, closing_summary(log, parameters))
 
 
 def closing_summary(
