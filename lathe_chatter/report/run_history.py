@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -43,6 +43,9 @@ _REASONS = {
     '': 'simulated time went back, and why is not in the record',
 }
 """Why a session but the first begins, by the sentence of its beginning."""
+_SPEED = 'spindle_speed_rpm'
+_CLOSE_UPON = 0.2
+"""s between two steps of the speed that are told as one: who sets it by hand takes longer."""
 _ESTIMATES = ('growth_rate', 'frequency', 'amplitude', 'recommended_speed_rpm')
 
 
@@ -53,6 +56,22 @@ class Ramp(NamedTuple):
     end: float
     low: float
     high: float
+
+
+class SpeedSteps(NamedTuple):
+    """Steps of the spindle speed, one close upon the other, as a supervisor makes a ramp of them.
+
+    Attributes:
+        time: Of the last, s.
+        start: Of the first, s.
+        speed: That the last has set, rev/min.
+        steps: How many they are.
+    """
+
+    time: float
+    start: float
+    speed: float
+    steps: int
 
 
 class Session(NamedTuple):
@@ -79,6 +98,9 @@ class Session(NamedTuple):
     known: bool
     described: MachineDescription | None = None
     ended: tuple[Change | Knock, ...] = ()
+
+
+Event: TypeAlias = Session | Change | Knock | Flag | SpeedSteps
 
 
 @dataclass(frozen=True)
@@ -126,15 +148,16 @@ class History:
         )  # fmt: skip
         return (first, *self.later_sessions)
 
-    def in_order(self) -> list[Session | Change | Knock | Flag]:
+    def in_order(self) -> list[Event]:
         """What happened after the start, as it happened."""
         at_ends = [event for session in self.later_sessions for event in session.ended]
-        found: list[Session | Change | Knock | Flag] = [*at_ends, *self.later_sessions]
+        found: list[Event] = [*at_ends, *self.later_sessions]
         found += (change for change in self.changes if change not in at_ends)
         found += (knock for knock in self.knocks if knock not in at_ends)
         found += self.flags
         # A flag at the time at which a session begins is of the one before: no sample had come.
-        return sorted(found, key=lambda each: (round(each.time, 9), not isinstance(each, Flag)))
+        found.sort(key=lambda each: (round(each.time, 9), not isinstance(each, Flag)))
+        return _with_steps_joined(found)
 
     def session_at(self, time: float) -> Session:
         """The session in which a time is, s."""
@@ -218,10 +241,30 @@ class History:
         return spans
 
 
-def in_words(event: Session | Change | Knock | Flag) -> str:
+def _with_steps_joined(events: list[Event]) -> list[Event]:
+    joined: list[Event] = []
+    for event in events:
+        last = joined[-1] if joined else None
+        if not (isinstance(event, Change) and [*event.new] == [_SPEED]):
+            joined.append(event)
+            continue
+        step = SpeedSteps(event.time, event.time, float(event.new[_SPEED]), 1)
+        if isinstance(last, Change) and [*last.new] == [_SPEED]:
+            last = SpeedSteps(last.time, last.time, float(last.new[_SPEED]), 1)
+        if isinstance(last, SpeedSteps) and 0.0 < event.time - last.time < _CLOSE_UPON:
+            joined[-1] = step._replace(start=last.start, steps=last.steps + 1)
+        else:
+            joined.append(event)
+    return joined
+
+
+def in_words(event: Event) -> str:
     """What happened, for a table or a list."""
     if isinstance(event, Session):
         return event.why
+    if isinstance(event, SpeedSteps):
+        steps = f'in {event.steps} steps since {event.start:.3f} s'
+        return f'{on_the_shop_floor(_SPEED, event.speed)}, {steps}'
     if isinstance(event, Change):
         return ', '.join(on_the_shop_floor(*changed) for changed in event.new.items())
     if isinstance(event, Knock):

@@ -15,7 +15,7 @@ from lathe_chatter.model import Cut, Machine
 from lathe_chatter.report.monitor_record import Flag
 from lathe_chatter.report.plotted_samples import RunSamples
 from lathe_chatter.report.run_excerpts import excerpts_of
-from lathe_chatter.report.run_history import History
+from lathe_chatter.report.run_history import History, in_words
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 
@@ -48,6 +48,21 @@ def test_the_speed_is_the_one_that_the_spindle_turned_with(acceleration: float) 
     places = list(range(50, len(between), 997))
     assert [run.speed_at(between[k]) for k in places] == pytest.approx(turned[places], rel=1e-6)
     assert run.cut_at(lathe.time).spindle_speed_rpm == 2500.0
+
+
+def test_steps_close_upon_each_other_are_told_as_one() -> None:
+    """A supervisor makes a ramp of ten and more; what somebody else does is told apart."""
+    changes = [speed_change(1.0, 3100.0)]
+    changes += [speed_change(2.0 + 0.04 * k, 3200.0 + 100.0 * k) for k in range(5)]
+    changes += [Change(2.17, {}, {'depth_of_cut': 4e-4}), speed_change(2.2, 4000.0)]
+    run = history([VirtualLathe().advance(30_000)], changes, 0.0)
+    assert [(round(each.time, 3), in_words(each)) for each in run.in_order()] == [
+        (1.0, '3100 rev/min'),
+        (2.16, '3600 rev/min, in 5 steps since 2.000 s'),
+        (2.17, 'depth 0.4 mm'),
+        (2.2, '4000 rev/min'),
+    ]
+    assert run.speed_at(2.1) == 3400.0
 
 
 def test_a_ramp_is_no_part_of_what_is_looked_at_closely() -> None:
