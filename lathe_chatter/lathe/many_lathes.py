@@ -14,7 +14,6 @@ from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import spread_out
 from lathe_chatter.lathe.state import LatheState
 from lathe_chatter.lathe.virtual_lathe import VirtualLathe
-from lathe_chatter.model import Cut
 from lathe_chatter.model.quantity_fields import count_of
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
@@ -98,16 +97,6 @@ class LatheSweep:
     def lathes(self) -> list[VirtualLathe]:
         """The lathes as they stand, each to be looked at, changed and continued by itself."""
         return [VirtualLathe.continued(each.lathe.snapshot()) for each in self._lathes]
-
-
-def sample_rate_for(cut: Cut, samples_per_turn: int) -> float:
-    """The sample rate, Hz, at which a turn of this cut is a whole number of samples.
-
-    Raises:
-        ParameterError: If the number is not whole, or below 1.
-    """
-    count_of('samples_per_turn', samples_per_turn, least=1)
-    return samples_per_turn * cut.spindle_speed_rpm / 60.0
 
 
 def _present(lathe: VirtualLathe) -> Array:

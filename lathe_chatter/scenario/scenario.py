@@ -94,11 +94,6 @@ class Scenario:
                     raise ScenarioError(f'{where}: {refusal}')
                 present = {**present, **step.changes}
 
-    @property
-    def parameter_names(self) -> list[str]:
-        """Every parameter that the scenario names, at the start or in a step."""
-        return [*self.parameters, *(name for step in self.steps for name in step.changes)]
-
 
 def shipped_scenarios() -> dict[str, Path]:
     """The scenario files of the package by name."""

@@ -15,7 +15,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.executors import Processes
 from lathe_chatter.lathe import VirtualLathe
-from lathe_chatter.lathe.many_lathes import LatheSweep, sample_rate_for
+from lathe_chatter.lathe.many_lathes import LatheSweep
 from lathe_chatter.model import Cut
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
@@ -23,7 +23,8 @@ _PER_TURN = 50
 
 
 def _lathe(cut: Cut, per_turn: int = _PER_TURN, **options: Any) -> VirtualLathe:
-    return VirtualLathe(cut=cut, sample_rate=sample_rate_for(cut, per_turn), **options)
+    rate = per_turn * cut.spindle_speed_rpm / 60.0
+    return VirtualLathe(cut=cut, sample_rate=rate, **options)
 
 
 def _assorted() -> list[VirtualLathe]:
@@ -133,8 +134,6 @@ def test_many_events_and_a_growing_surface() -> None:
     [
         (lambda: LatheSweep([]), 'at least one VirtualLathe'),
         (lambda: LatheSweep([3]), 'lathes is 3'),
-        (lambda: sample_rate_for(Cut(), 0), 'samples_per_turn is 0'),
-        (lambda: sample_rate_for(Cut(), 2.5), 'samples_per_turn'),
         (lambda: _sweep().advance(1, columns='time'), 'a list of some of time'),
         (lambda: _sweep().advance(-1), 'samples'),
         (lambda: _sweep().advance(1.5), 'samples'),
