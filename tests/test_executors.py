@@ -15,8 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.worker_calls import fatal, refused, square, square_unless_killed
 
 from lathe_chatter import executors
+from lathe_chatter.cli import worker_options
 from lathe_chatter.cli.worker_options import open_executor
 from lathe_chatter.errors import ParameterError, WorkerError
 from lathe_chatter.executors import Processes, batches_of, run_batches, spread, width_of
@@ -169,33 +171,11 @@ def test_no_more_is_begun_than_keeps_the_workers_busy() -> None:
     assert len(taken) <= 8
 
 
-def test_a_cluster_that_is_not_there_is_a_sentence() -> None:
+def test_a_cluster_that_is_not_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('distributed')
+    monkeypatch.setattr(worker_options, '_DASK_TIMEOUT', 1.0)
     for address in ('tcp://127.0.0.1:1', 'nonsense'):
         with pytest.raises(ParameterError, match='a Dask scheduler that answers'):
             open_executor(2, address).__enter__()
     with open_executor(3) as pool:
         assert width_of(pool) == 3
-
-
-def square(number: int) -> int:
-    return number * number
-
-
-def refused(number: int) -> int:
-    if number >= 3:
-        raise ParameterError('number', number, '', 'below 3')
-    return number
-
-
-def fatal(_number: int) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def square_unless_killed(number: int, mark: Path) -> int:
-    """The first worker that comes to 5 is killed, with whatever else it has."""
-    time.sleep(0.02)
-    if number == 5 and not mark.exists():
-        mark.touch()
-        fatal(number)
-    return square(number)
