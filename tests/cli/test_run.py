@@ -124,23 +124,14 @@ def test_without_clearance_nothing_is_flagged(tmp_path: Path, environment: dict[
     assert happened[1:] == ['depth 0.62 mm', 'end']
 
 
-def test_the_report_has_the_parameters_of_the_start(
-    tmp_path: Path, environment: dict[str, str]
-) -> None:
-    scenario = tmp_path / 'other.yaml'
-    start = '{real_time_factor: 2.0, spindle_speed_rpm: 4100, depth_of_cut: 0.0003}'
-    scenario.write_text(f'name: other\nduration: 0.5\nparameters: {start}\n')
-    figures = play(scenario, tmp_path / 'run', environment)
-    assert figures['occurrences'][0]['what'].startswith('start: 4100 rev/min, depth 0.3 mm')
-
-
-def test_the_monitor_knows_the_machine_of_the_scenario(
+def test_monitor_and_report_know_the_machine_and_the_cut_of_the_scenario(
     tmp_path: Path, environment: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its advice is that of a monitor without ROS, which has the machine of the lathe."""
+    """The advice is that of a monitor without ROS, which has the machine of the lathe."""
     scenario = tmp_path / 'heavier.yaml'
     machine = 'tool.mass: 0.1, workpiece.mass: 0.12, workpiece.damping_ratio: 0.03'
-    start = f'{{real_time_factor: 2.0, depth_of_cut: 0.0004, {machine}}}'
+    cut = 'spindle_speed_rpm: 3100, depth_of_cut: 0.0004'
+    start = f'{{real_time_factor: 2.0, {cut}, {machine}}}'
     scenario.write_text(
         f'name: heavier\nduration: 4.0\nparameters: {start}\n'
         'steps: [{at: 1.0, set: {depth_of_cut: 0.0018}}]\nexpect: {flagged: true}\n'
@@ -150,9 +141,9 @@ def test_the_monitor_knows_the_machine_of_the_scenario(
     told = capsys.readouterr()
     assert 'try ' in told.err
     simulated = advised(json.loads(told.out))
-    assert advised(play(scenario, tmp_path / 'run', environment)) == pytest.approx(
-        simulated, rel=0.03
-    )
+    figures = play(scenario, tmp_path / 'run', environment)
+    assert figures['occurrences'][0]['what'].startswith('start: 3100 rev/min, depth 0.4 mm')
+    assert advised(figures) == pytest.approx(simulated, rel=0.03)
 
 
 def advised(figures: dict[str, Any]) -> float:
