@@ -7,7 +7,8 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 # The Python to make environments with; empty: the first of 3.10 to 3.13 on PATH.
 export PYTHON ?=
 ARGS ?=
-PYTEST = -m pytest -n 2 --dist loadfile
+# A worker more than the two cores that are there at least: many tests wait for ROS.
+PYTEST = -m pytest -n 3 --dist loadfile
 TALKS_TO_ROS = tests/nodes tests/cli/test_run.py
 RUN_ENDS = the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it \
   an_interrupted_run_is_complete_up_to_then
