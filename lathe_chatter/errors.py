@@ -28,6 +28,11 @@ def _remade(
     return error
 
 
+def shortened(text: str, most: int = 300) -> str:
+    """A text as a sentence repeats it: of one that is very long the middle is left out."""
+    return text if len(text) <= most else f'{text[: most // 2]} ... {text[-most // 4 :]}'
+
+
 class ParameterError(LatheChatterError, ValueError):
     """A value that the machine or the cut cannot have.
 
@@ -44,7 +49,7 @@ class ParameterError(LatheChatterError, ValueError):
         self.value = value
         self.unit = unit
         self.allowed = allowed
-        shown = repr(value) if isinstance(value, str) else str(value)
+        shown = shortened(repr(value) if isinstance(value, str) else str(value))
         if unit and isinstance(value, Number) and not isinstance(value, bool):
             shown = f'{shown} {unit}'
         elif unit and unit not in allowed:  # what is no number has no unit

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from typing import Any, TypeGuard
 
-from lathe_chatter.errors import ParameterError, nearest_name
+from lathe_chatter.errors import ParameterError, nearest_name, shortened
 from lathe_chatter.html_table import html_table
 from lathe_chatter.model.quantity_fields import Quantity, check_choice, quantity_of
 from lathe_chatter.model.values_with_units import number_in, units_of
@@ -191,7 +191,7 @@ class ParameterTable:
         """A sentence about a name that is no parameter, with the nearest that is."""
         near = self.nearest(name)
         hint = f': did you mean {near}?' if near else '.'
-        return f'There is no parameter {name!r}{hint}'
+        return f'There is no parameter {shortened(repr(name))}{hint}'
 
     def nearest(self, name: str) -> str | None:
         """The parameter that may have been meant by a name that is none."""

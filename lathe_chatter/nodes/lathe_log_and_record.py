@@ -22,7 +22,7 @@ from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model import Cut
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
-from lathe_chatter.nodes.log_rate_limit import QuickLog
+from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.recording.provenance import ended_by
 
@@ -37,6 +37,7 @@ class LatheRecord:
 
     Args:
         node: The lathe.
+        bounded_log: Its logger for what tells of the pace, which moves no sample.
         values: Its parameters at the start.
 
     Raises:
@@ -44,9 +45,9 @@ class LatheRecord:
         LatheChatterError: If it cannot be made.
     """
 
-    def __init__(self, node: Node, values: Mapping[str, Any]) -> None:
+    def __init__(self, node: Node, bounded_log: BoundedLog, values: Mapping[str, Any]) -> None:
         """Begin, at time zero."""
-        self._logger = QuickLog(node.get_logger())
+        self._logger, self._bounded_log = QuickLog(node.get_logger()), bounded_log
         self._run: LatheRun | None = None
         self._folder, self._failure = values['record'], ''
         if self._folder:
@@ -88,7 +89,7 @@ class LatheRecord:
         """Simulated time goes at another pace from a simulated time on, s."""
         pace = f'{factor:g} times as fast as the clock' if factor else 'as fast as it can'
         said = f'At {time:.6f} s: from here on simulated time is to go {pace}.'
-        self._logger.info(said)
+        self._bounded_log.info(said, 'pace')
 
     def restarted(self, time: float, old: Cut, new: Cut) -> None:
         """The lathe begins again, with a cut that may have been asked for since its last tick."""

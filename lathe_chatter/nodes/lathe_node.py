@@ -85,7 +85,7 @@ class LatheNode(ParameterNode):
         self._sample_rate: float = values['sample_rate']
         self._samples_per_tick = samples_per_tick(self._sample_rate, values['tick_rate'])
         # Before the first tick is due.
-        precompile(LATHE_LOOP, say=self.get_logger().info)
+        precompile(LATHE_LOOP, say=self.bounded_log.info)
         self._lathe = recorded_config(values).lathe()
         self._pending: Cut | None = None
         self._knocks: list[float] = []
@@ -93,7 +93,7 @@ class LatheNode(ParameterNode):
         self._topics = LatheTopics(
             self, self._lathe.columns, values['tick_rate'], self._factor, publish_clock=drives
         )
-        self._record = LatheRecord(self, values)
+        self._record = LatheRecord(self, self.bounded_log, values)
 
         self._control = RunControl()
         self._awaited: int = values['await_readers']
@@ -120,7 +120,7 @@ class LatheNode(ParameterNode):
             self.create_timer(1.0 / values['tick_rate'], self.wake, clock=steady)
         self.create_timer(1.0, self._report, clock=steady)
         if self._awaited:
-            self.get_logger().info(f'Waiting for {self._awaited} readers of my samples.')
+            self.bounded_log.info(f'Waiting for {self._awaited} readers of my samples.')
 
     # -- time ------------------------------------------------------------------------------
 
@@ -248,7 +248,7 @@ class LatheNode(ParameterNode):
 
     def _end(self, because: str) -> None:
         self._control.end(because)
-        self.get_logger().error(because)
+        self.bounded_log.error(because)
         self._diagnostics.publish(self._statuses())
 
     def finish(self) -> None:
@@ -299,8 +299,6 @@ class LatheNode(ParameterNode):
                 )
             else:
                 self._knocks.append(message.data)
-            if self._control.state is RunState.PAUSED:
-                self._knock()
         self.requests.note(began)
 
     def _knock(self) -> None:
@@ -347,9 +345,10 @@ class LatheNode(ParameterNode):
         answer = self._control.reset()
         self._pending, self._knocks = None, []
         before, self._lathe = self._lathe, recorded_config(self.values).lathe()
-        self._record.restarted(before.time, before.cut, self._lathe.cut)
+        if before.samples_taken or before.cut != self._lathe.cut:  # else nothing has begun again
+            self._record.restarted(before.time, before.cut, self._lathe.cut)
         self._start_clock()
-        self.get_logger().info(answer.message)
+        self.bounded_log.info(answer.message, 'reset')
         return self._reported(answer)
 
     def _reported(self, answer: Answer) -> Answer:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
@@ -16,7 +15,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.nodes.joint_state_message import joint_states, time_message
-from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
+from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block, encode_number
@@ -70,7 +69,7 @@ class LatheTopics:
 
     def __init__(
         self,
-        node: Node,
+        node: ParameterNode,
         columns: tuple[str, ...],
         tick_rate: float,
         factor: float,
@@ -98,7 +97,7 @@ class LatheTopics:
         # Without a /clock nobody knows simulated time: stamps are the node's then.
         self._follows = bool(node.get_parameter('use_sim_time').value)
         self._now = None if publish_clock or self._follows else node.get_clock().now
-        self._log = BoundedLog(QuickLog(node.get_logger()))
+        self._log = node.bounded_log
         self.zero: int | None = None
         self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
         self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
@@ -139,11 +138,10 @@ class LatheTopics:
         if self.zero is None or abs(zero - self.zero) > _SAME:
             self.zero = zero
             said = f'Time 0 of the samples is {zero / 1e9:.6f} s of /clock.'
-            self._log.info(said, 'clock')
+            self._log.info(said, 'time zero')
 
     def _look_around(self) -> None:
         """See from time to time who listens: to ask at each tick costs as much as a sample."""
-        self._log.look()
         self._heard_scalars = [s for s in self._scalars if s[0].get_subscription_count()]
         self._heard_joints = self._joints.get_subscription_count() > 0
         self._timed = self._follows or self._heard_joints or self._clock is not None

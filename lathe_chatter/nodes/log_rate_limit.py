@@ -10,10 +10,14 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity
 
+from lathe_chatter.errors import shortened
+
 BURST = 5
 """Sentences of one kind that are logged as they come."""
 PERIOD = 10.0
 """s after which one more of the kind may be logged, and its burst is whole again."""
+_LONGEST = 2000
+"""Characters of a sentence: what others sent, as names of columns, may be of any length."""
 MAX_KINDS = 1000
 """Kinds that are kept apart; what comes under a new name beyond them is one kind."""
 
@@ -105,10 +109,10 @@ class BoundedLog:
         self._log_held_back(kind)
         if kind.logged < BURST:
             kind.logged += 1
-            self._log(severity, sentence)
+            self._log(severity, shortened(sentence, _LONGEST))
         else:
             kind.held += 1
-            kind.last, kind.severity = sentence, severity
+            kind.last, kind.severity = shortened(sentence, _LONGEST), severity
 
     def _log_held_back(self, kind: _Kind) -> None:
         """Begin a new period, if one is over, with what the old one held back."""

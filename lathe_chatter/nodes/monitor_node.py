@@ -79,7 +79,7 @@ class MonitorNode(ParameterNode):
         """Begin with the flag down and nothing known."""
         super().__init__('chatter_monitor', MONITOR, **options)
         # Before the first sample comes.
-        precompile(DETECTOR_LOOP, say=self.get_logger().info)
+        precompile(DETECTOR_LOOP, say=self.bounded_log.info)
         source = ModelSource(self.values['model'])
         self.machine: Machine | None = None
         if source is ModelSource.PARAMETERS:

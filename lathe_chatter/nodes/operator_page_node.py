@@ -60,7 +60,7 @@ class OperatorPageNode(ParameterNode):
         """Listen for viewers; `serve` serves them."""
         super().__init__('operator_page', PAGE, **options)
         # Before the first viewer comes: while it is compiled the page stands still.
-        precompile(CHART_LOOPS, say=self.get_logger().info)
+        precompile(CHART_LOOPS, say=self.bounded_log.info)
         values: Any = self.values
         self.server = PageServer(self, values['host'], values['port'], values['token'])
         self.heard = DiagnosticsListener()
@@ -80,7 +80,7 @@ class OperatorPageNode(ParameterNode):
                 (ParameterEvent, '/parameter_events', QoSProfile(depth=100), self._on_event),
             )
         ]
-        self.get_logger().info(f'The page is at {self.server.url}')
+        self.bounded_log.info(f'The page is at {self.server.url}')
 
     def declare_parameter(self, name: str, value: Any = None, *rest: Any, **more: Any) -> Any:
         """Declare a parameter; the token is told to nobody, nor recorded with the others."""

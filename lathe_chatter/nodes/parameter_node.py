@@ -26,6 +26,8 @@ from lathe_chatter.nodes.polled_subscription import is_polled
 from lathe_chatter.nodes.real_time_loop import RequestLoad
 
 _SET_SERVICES = (SetParameters, SetParametersAtomically)
+_MAX_ENTRIES = 200
+"""Parameters in one request, twice those of any node here: each takes rclpy half a ms."""
 
 
 class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type information
@@ -163,11 +165,24 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         def serve(request: Any, response: Any) -> Any:
             began = time.monotonic_ns()
             try:
+                if (count := _entries(request)) > _MAX_ENTRIES:
+                    return self._refused(count, response)
                 return callback(request, response)
             finally:
                 self.requests.note(began)
 
         return super().create_service(srv_type, srv_name, serve, **options)
+
+    def _refused(self, count: int, response: Any) -> Any:
+        """The answer to one request that would hold up all others, and the cut, for seconds."""
+        said = f'At most {_MAX_ENTRIES} parameters fit in one request, and these are {count}.'
+        self.bounded_log.warning(f'Refused: {said}', 'refused')
+        result = SetParametersResult(successful=False, reason=said)
+        if isinstance(response, SetParameters.Response):
+            response.results = [result] * count
+        elif isinstance(response, SetParametersAtomically.Response):
+            response.result = result
+        return response  # to who asks for values without any, as rclpy does of an unknown name
 
     def _noting_names(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         def answer(request: Any, response: Any) -> Any:
@@ -193,7 +208,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                 if self._table.nearest(name):
                     raise UnknownParameterError(self._table.unknown(name))
                 # As from a file of parameters for all nodes of a system.
-                self.get_logger().warning(self._table.unknown(name))
+                self.bounded_log.warning(self._table.unknown(name), 'unknown')
         return {
             name: self._table[name].parsed(parameter.value)
             for name, parameter in overrides.items()
@@ -243,6 +258,12 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         if changed:
             self._values = {**self._values, **changed}
             self.parameters_accepted(changed)
+
+
+def _entries(request: Any) -> int:
+    """How many parameters a request names; 0 of one about something else."""
+    fields = ('parameters', 'names', 'prefixes')
+    return max(len(getattr(request, field, ())) for field in fields)
 
 
 def _without_unknown_types(callback: Callable[..., Any]) -> Callable[..., Any]:

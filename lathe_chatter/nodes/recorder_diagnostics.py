@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from rclpy.node import Node
 
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
+from lathe_chatter.nodes.log_rate_limit import BoundedLog
 from lathe_chatter.nodes.polled_subscription import publisher_names, several_publish
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.nodes.recorder_topic_selection import TopicWatch
@@ -75,7 +75,7 @@ def mixture(node: Node, topic: str, received: SamplesReceived) -> str:
     return f'{received.mixture}.'
 
 
-def log_news(logger: Any, log: RunLog) -> str:
+def log_news(logger: BoundedLog, log: RunLog) -> str:
     """Say where samples began, began again or are missing; each is said once.
 
     Args:
@@ -91,12 +91,12 @@ def log_news(logger: Any, log: RunLog) -> str:
         for place in received.discontinuities:
             if place.order is not BlockOrder.GAP:
                 said = f'{name} {_begins(place)}.'
-                logger.info(said)
+                logger.info(said, f'{name} begins')
         if gaps:  # there may be many
             missing = sum(place.missing for place in gaps)
             where = f'between {gaps[0].before:.6f} s and {gaps[-1].after:.6f} s'
             said = f'{name}: {missing} samples {where} did not come.'
-            logger.warning(said)
+            logger.warning(said, f'{name} lost')
         received.discontinuities.clear()
     return said
 

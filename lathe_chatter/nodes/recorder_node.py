@@ -172,7 +172,7 @@ class RecorderNode(ParameterNode):
         for name in values['attachments']:
             self._attach(sink, Path(name))
         where = f'into {self.run}' if self.run else f'the last {values["snapshot"]:g} s in memory'
-        self.get_logger().info(f'Recording {where}.')
+        self.bounded_log.info(f'Recording {where}.', 'begun')
         self._look()
         return self.run
 
@@ -180,7 +180,8 @@ class RecorderNode(ParameterNode):
         try:
             sink.attach_file(file)
         except OSError as error:
-            self.get_logger().warning(f'{file} is not attached to the run: {reason_of(error)}.')
+            said = f'{file} is not attached to the run: {reason_of(error)}.'
+            self.bounded_log.warning(said, 'attachment')
 
     def stop(self, ended_early: str = '') -> Answer:
         """Finish the run, with everything that has arrived; also before its time, and why."""
@@ -265,9 +266,9 @@ class RecorderNode(ParameterNode):
             return
         done, said = self.stop(ended_by(sys.exc_info()[1]))
         if not done:
-            self.get_logger().error(said)
+            self.bounded_log.error(said)
             raise RecordingFailedError(said)
-        self.get_logger().info(said)
+        self.bounded_log.info(said)
 
     # -- what comes ------------------------------------------------------------------------
 
@@ -286,7 +287,7 @@ class RecorderNode(ParameterNode):
             for received in self._log.samples.values():
                 received.clock_stepped(round(step.seconds * 1e9))
             self._sink.note(CLOCK, self._clock_watch.values())
-            self.get_logger().warning(f'Noted: {step_sentence(step.seconds)}')
+            self.bounded_log.warning(f'Noted: {step_sentence(step.seconds)}', 'clock step')
         self._stalls.note(time.monotonic())
         self._watch.take()
         if self._snapshot is not None and len(self._log.flags) > self._flags:
@@ -294,7 +295,7 @@ class RecorderNode(ParameterNode):
             self._flags = len(self._log.flags)
             if raised:
                 done, said = self.snapshot('Chatter was flagged.')
-                (self.get_logger().info if done else self.get_logger().error)(said)
+                (self.bounded_log.info if done else self.bounded_log.error)(said, 'snapshot')
 
     def _write(
         self, topic: Topic, data: bytes, log_time: int, publish_time: int, number: int
@@ -343,11 +344,11 @@ class RecorderNode(ParameterNode):
             if received.restarted:
                 self._remote.want_again(topic.removesuffix('/samples'))
             if who := mixture(self, topic, received):
-                self.get_logger().error(who)
+                self.bounded_log.error(who)
         now = time.monotonic()
         if not last and now <= self._next_news:
             return
-        said = log_news(self.get_logger(), self._log)
+        said = log_news(self.bounded_log, self._log)
         if said:  # a place where samples are missing seldom comes alone
             self._next_news = now + _NEWS_PERIOD
         if last and said and '/rosout' in self._topics:
@@ -364,7 +365,7 @@ class RecorderNode(ParameterNode):
     def _fail(self, error: Exception) -> None:
         said = str(error) if isinstance(error, LatheChatterError) else f'{self.run}: {error}.'
         self._failure = said
-        self.get_logger().error(said)
+        self.bounded_log.error(said)
         if self._writer is not None:
             self._writer.abandon()
             self._writer = None

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.log_rate_limit import BoundedLog
 from lathe_chatter.nodes.simulation_control import Answer
 
 
@@ -30,7 +31,8 @@ class Recorder(Protocol):
     def pause(self, *, pause: bool) -> Answer:
         """Leave out what comes, or no longer."""
 
-    def get_logger(self) -> Any:
+    @property
+    def bounded_log(self) -> BoundedLog:
         """Where to say what was done."""
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
@@ -52,7 +54,7 @@ def create_services(recorder: Recorder) -> None:
         def answer(_request: Any, response: Any) -> Any:
             response.success, response.message = act()
             if response.success and act is not start:  # which has said so itself
-                recorder.get_logger().info(response.message)
+                recorder.bounded_log.info(response.message, 'asked')
             return response
 
         return answer

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import RECORDED_TOPICS
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic, Write, topic_of
 from lathe_chatter.nodes.topic_types import MissingTypeError, message_type
@@ -112,7 +113,7 @@ class TopicWatch:
         paused: Whether what comes is left out.
     """
 
-    def __init__(self, node: Node, wanted: Selection, sink: Sink, write: Write) -> None:
+    def __init__(self, node: ParameterNode, wanted: Selection, sink: Sink, write: Write) -> None:
         """Begin with none found."""
         self.topics: dict[str, RecordedTopic] = {}
         self.awaited: list[str] = []
@@ -167,7 +168,7 @@ class TopicWatch:
         named = (name for name in self._wanted.among(()) if name in self._wanted.asked)
         self.awaited = [name for name in named if not self._met.get(name)]
         if self.awaited and not self._warned:
-            self._node.get_logger().warning(
+            self._node.bounded_log.warning(
                 f'Nobody publishes {", ".join(self.awaited)} so far: nothing of it is recorded.'
             )
         self._warned = True
@@ -209,7 +210,7 @@ class TopicWatch:
             found = message_type(offers[0])
         except MissingTypeError as error:
             self.refused[name] = kind
-            self._node.get_logger().warning(f'{name} is not recorded: {error}.')
+            self._node.bounded_log.warning(f'{name} is not recorded: {error}.')
             return
         topic = topic_of(name, found, offers)
         if not self._wanted.repeat:
@@ -218,7 +219,7 @@ class TopicWatch:
         if former is not None:
             former.end()
             self._former[name] = self._counted(former)
-            self._node.get_logger().info(f'{name} is now of type {kind}, and recorded as such.')
+            self._node.bounded_log.info(f'{name} is now of type {kind}, and recorded as such.')
         try:
             recorded = RecordedTopic(
                 self._node,
@@ -232,7 +233,7 @@ class TopicWatch:
         except Exception as error:  # noqa: BLE001 -- of the middleware, about this topic alone
             self.refused[name] = kind
             said = ' '.join(str(error).split())
-            self._node.get_logger().warning(f'{name} is not recorded: {said}')
+            self._node.bounded_log.warning(f'{name} is not recorded: {said}')
             return
         self._sink.add_topic(topic)
         recorded.paused = self.paused and name not in ALWAYS

@@ -21,6 +21,7 @@ from lathe_chatter.model.lathe_parameter_table import (
     machine_in_cut,
 )
 from lathe_chatter.model.machine_file import MachineDescription
+from lathe_chatter.nodes.parameter_node import ParameterNode
 
 _SETTLING = 1.0
 """s from when this node has found the services of another to when the other has found it too: an
@@ -153,7 +154,7 @@ class RemoteMachine:
         on_machine: Called with the machine, and with its file where it has one.
     """
 
-    def __init__(self, node: Node, on_machine: OnMachine) -> None:
+    def __init__(self, node: ParameterNode, on_machine: OnMachine) -> None:
         """Nothing is asked yet."""
         self._node, self._on_machine = node, on_machine
         self._parameters = RemoteParameters(node, self._take)
@@ -199,6 +200,5 @@ class RemoteMachine:
             self._on_machine(machine, file)
 
     def _complain(self, reason: str) -> None:
-        self._node.get_logger().error(
-            f'The lathe does not say what machine it is: {reason}', throttle_duration_sec=60.0
-        )
+        said = f'The lathe does not say what machine it is: {reason}'
+        self._node.bounded_log.error(said, 'machine')

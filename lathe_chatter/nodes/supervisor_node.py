@@ -68,7 +68,7 @@ class SupervisorNode(ParameterNode):
         """Listen, and hold still until it is known who else is there."""
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
         # Before there is any hurry: moves are rehearsed on a virtual lathe.
-        precompile(LATHE_LOOP, MOVE_LOOPS, say=self.get_logger().info)
+        precompile(LATHE_LOOP, MOVE_LOOPS, say=self.bounded_log.info)
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
         self._state = ''
         self._chatter: bool | None = None  # until the monitor has said
@@ -145,7 +145,7 @@ class SupervisorNode(ParameterNode):
             for sentence in unsuited(limits, self._cut, spindle):
                 if sentence not in self._warned_of:
                     self._warned_of.add(sentence)
-                    self.get_logger().warning(sentence)
+                    self.bounded_log.warning(sentence, 'limits')
         speeds = narrowed((limits.slowest_speed, limits.fastest_speed), spindle)
         if speeds is None:
             self._no_speed = 'the spindle has no speed from slowest_speed to fastest_speed'
@@ -155,7 +155,7 @@ class SupervisorNode(ParameterNode):
     def parameters_accepted(self, changed: Mapping[str, Value]) -> None:
         """Begin anew with what was set."""
         self._core = self._new_core()
-        self._say(f'From now on: {", ".join(f"{n} = {v}" for n, v in changed.items())}.')
+        self._say(f'From now on: {", ".join(f"{n} = {v}" for n, v in changed.items())}.', 'set')
 
     # -- listening -----------------------------------------------------------------------------
 
@@ -220,7 +220,7 @@ class SupervisorNode(ParameterNode):
             if told and source != ModelSource.NONE.value:
                 self._machine = machine_from(told)
         except LatheChatterError as error:
-            self.get_logger().error(f'{name} does not say what it is: {error}')
+            self.bounded_log.error(f'{name} does not say what it is: {error}', name)
 
     # -- acting --------------------------------------------------------------------------------
 
@@ -321,9 +321,9 @@ class SupervisorNode(ParameterNode):
         if action is not None and action.sentence:
             self._say(action.sentence)
 
-    def _say(self, sentence: str) -> None:
+    def _say(self, sentence: str, kind: str = 'action') -> None:
         self._newest = sentence
-        self.get_logger().info(sentence)
+        self.bounded_log.info(sentence, kind)
         self._action.publish(String(data=sentence))
         self._diagnostics.publish(self._statuses())
 

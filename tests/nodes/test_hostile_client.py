@@ -5,8 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy.qos import HistoryPolicy, QoSProfile
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
 from support.node_bench import Bench, messages_of
 from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
@@ -69,6 +78,56 @@ def test_requests_that_nobody_can_fulfil_are_refused_with_a_reason(
     (times,) = samples.runs()
     assert contiguous(times)
     assert lathe.poll() is None
+
+
+def test_a_request_of_absurd_size_is_refused_at_once(bench: Bench, nodes: NodeProcesses) -> None:
+    """The lathe would stand for seconds, and everybody else wait."""
+    samples = Samples(bench)
+    nodes.start('lathe')
+    many = messages_of({'depth_of_cut': 0.001}) * 20_000
+    results = bench.call(SetParameters, SERVICE, SetParameters.Request(parameters=many)).results
+    reason = 'At most 200 parameters fit in one request, and these are 20000.'
+    assert len(results) == len(many)
+    assert {(each.successful, each.reason) for each in results} == {(False, reason)}
+    request = SetParametersAtomically.Request(parameters=many)
+    result = bench.call(SetParametersAtomically, f'{SERVICE}_atomically', request).result
+    assert (result.successful, result.reason) == (False, reason)
+    names = ['depth_of_cut'] * 100_000
+    for kind, service, field in (
+        (GetParameters, 'get_parameters', 'values'),
+        (GetParameterTypes, 'get_parameter_types', 'types'),
+        (DescribeParameters, 'describe_parameters', 'descriptors'),
+    ):
+        answer = bench.call(kind, f'/lathe/{service}', kind.Request(names=names))
+        assert not getattr(answer, field)
+    listed = ListParameters.Request(prefixes=names)
+    assert not bench.call(ListParameters, '/lathe/list_parameters', listed).result.names
+    assert depth_of(bench) == 0.0005
+    (times,) = samples.runs()
+    assert contiguous(times)
+
+
+def test_floods_of_all_kinds_leave_a_log_that_can_be_read(
+    bench: Bench, nodes: NodeProcesses
+) -> None:
+    reports = Reports(bench)
+    nodes.start('lathe')
+    knocks = bench.talk(Float64, '/lathe/knock')
+    bench.call(SetBool, '/lathe/pause', SetBool.Request(data=True))
+    for k in range(300):
+        knocks.publish(Float64(data=1e-6))
+        bench.set('/lathe', real_time_factor=1.0 + k % 2, depth_of_cut=1e-4 * (1 + k % 2))
+        bench.trigger('/lathe/reset')
+    bench.call(SetBool, '/lathe/pause', SetBool.Request(data=False))
+    bench.call(Trigger, '/lathe/reset', Trigger.Request())
+    bench.set('/lathe', depth_of_cut=3e-4)
+    bench.spin_until(
+        lambda: any(' of this kind in' in said for said in reports.sentences('lathe')), 'a count'
+    )
+    said = reports.sentences('lathe')
+    assert len([each for each in said if 'from here on simulated time' in each]) <= 7
+    assert len([each for each in said if each.startswith('At time zero again')]) <= 7
+    assert len([each for each in said if 'knock of' in each]) <= 1
 
 
 def set_of(depth: float) -> SetParameters.Request:

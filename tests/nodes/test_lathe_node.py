@@ -290,13 +290,15 @@ def test_a_knock_is_the_cores(bench: Bench) -> None:
     knock = bench.talk(Float64, '/lathe/knock')
     taken(bench, messages, 2)
     logged = bench.listen(Log, '/rosout', LATCHED)
-    for impulse in (float('nan'), 0.01):
+    for impulse in (0.004, 0.006, float('nan')):
         knock.publish(Float64(data=impulse))
-    bench.spin_until(lambda: any('knock of 0.01 N s' in log.msg for log in logged), 'the knock')
+    # At rest they are kept for the next tick; the last is refused as it comes.
+    bench.spin_until(lambda: any('impulse is nan' in log.msg for log in logged), 'a refusal')
     core = VirtualLathe()
     core.advance(2 * TICK)
     core.knock(0.01)
     assert taken(bench, messages, 5).tobytes() == core.advance(5 * TICK).tobytes()
+    bench.spin_until(lambda: any('knock of 0.01 N s' in log.msg for log in logged), 'the knock')
 
 
 def test_a_step_is_refused_while_it_runs(start: Callable[..., Any], bench: Bench) -> None:

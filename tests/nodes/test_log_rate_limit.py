@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from pathlib import Path
 from typing import Any
 
+import lathe_chatter.nodes
 from lathe_chatter.nodes.log_rate_limit import BURST, MAX_KINDS, PERIOD, BoundedLog, QuickLog
 
 
@@ -83,3 +86,31 @@ def test_what_is_held_back_when_the_node_ends_is_told() -> None:
     assert out.lines[-1][1] == f'{BURST + 2} samples are missing. (3 of this kind in 0 s.)'
     bounded.end()
     assert len(out.lines) == BURST + 1
+
+
+def test_a_sentence_is_bounded_too_whatever_others_sent() -> None:
+    out = Lines()
+    bounded = BoundedLog(out, out.now)
+    for _ in range(BURST + 1):
+        bounded.warning('x' * 1_000_000, 'sent')
+    bounded.end()
+    assert len(out.lines) == BURST + 1
+    assert max(len(text) for _, text in out.lines) < 3000
+
+
+def test_no_node_logs_past_its_bounds() -> None:
+    """But for the record of a cut, which its ticks bound and `LatheRecord` keeps."""
+    folder = Path(lathe_chatter.nodes.__file__).parent
+    for file in folder.glob('*.py'):
+        tree = ast.parse(file.read_text(encoding='utf-8'))
+        calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        allowed = {id(arg) for call in calls for arg in call.args if named(call) == 'QuickLog'}
+        asked = [call for call in calls if named(call) == 'get_logger' and id(call) not in allowed]
+        places = [f'{file.name}:{call.lineno}' for call in asked]
+        # Before there is a node there is the line that a file of parameters reaches nobody.
+        assert len(places) == (file.name == 'node_main.py'), places
+
+
+def named(call: ast.Call) -> str:
+    function = call.func
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, 'id', '')

@@ -132,3 +132,16 @@ def test_a_silence_shows_while_it_lasts_and_a_loss_is_a_warning(
     spin_until(lambda: shop.said(WARNING), 'the warning')
     said = f'{SAMPLES}: 40 samples between 0.004000 s and 0.008100 s did not come.'
     assert shop.said(WARNING) == [said]
+
+
+def test_a_lathe_that_begins_again_without_end_is_a_few_lines(shop: Shop) -> None:
+    shop.recorder(SAMPLES)
+    publisher = shop.bench.talk(Float64MultiArray, SAMPLES)
+    blocks = [encode_block(VirtualLathe().advance(20)) for _ in range(40)]
+    for block in blocks:
+        publisher.publish(block)
+    # Told when the places are, and the rest of them when their time is over.
+    shop.bench.spin_until(
+        lambda: any(' of this kind in' in said for said in shop.said(NOTE)), 'it'
+    )
+    assert len([said for said in shop.said(NOTE) if 'after the lathe started' in said]) <= 7

@@ -19,6 +19,7 @@ LATHE, CLOCK = 'nodes/test_lathe_node.py', 'nodes/test_followed_clock.py'
 CONTROL, STANDARD = 'nodes/test_simulation_control.py', 'nodes/test_simulation_services.py'
 ARGUMENTS = 'nodes/test_command_line_parameters.py'
 MAIN, MONITOR = 'nodes/test_node_main.py', 'nodes/test_monitor_node.py'
+HOSTILE = 'nodes/test_hostile_client.py'
 STATISTICS, GROUP = 'nodes/test_lathe_diagnostics.py', 'nodes/test_node_processes.py'
 
 SAID = {
@@ -200,6 +201,10 @@ SAID = {
         'Refused: {}': (
             'a set was not accepted, for the reason that its answer has; bounded in a flood',
             f'{LATHE}::test_a_refused_set_is_in_the_log',
+        ),
+        'At most {} parameters fit in one request, and these are {}.': (
+            'a request names more; nothing of it is done',
+            f'{HOSTILE}::test_a_request_of_absurd_size_is_refused_at_once',
         ),
         '{} can be given at the start only.': (
             'the parameter exists, and is no run-time one',
