@@ -18,7 +18,7 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.atomic_output import atomic_output
 from lathe_chatter.errors import ExportExistsError, ParameterError, RunReadError, optional
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.sample_blocks import TIME
+from lathe_chatter.recording.sample_blocks import TIME, CutsInARow
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.samples.columns import UNITS
 from lathe_chatter.samples.continuity import Continuity, time_text
@@ -184,6 +184,7 @@ class ExportedParts:
         names: Of the columns, in the order of the record.
         count: Samples so far.
         continuity: Where they do not follow each other, so far.
+        before: How long the cuts took that were before each of the latest part, s (n,).
     """
 
     def __init__(self, run: Run, chosen: Selection, progress: Progress | None) -> None:
@@ -197,6 +198,7 @@ class ExportedParts:
             raise ParameterError('start', chosen.start, 's', f'at most the end, {chosen.end:g} s')
         self._run, self._chosen, self._progress = run, chosen, progress
         self.count, self.continuity = 0, Continuity(remember=True)
+        self.before: Array = np.zeros(0)
         first = next(iter(run.sample_blocks(chosen.topic)), None)
         if first is None:
             topic = chosen.topic or run.samples_topic()
@@ -212,9 +214,14 @@ class ExportedParts:
 
     def __iter__(self) -> Iterator[Array]:
         """Samples (n, k)."""
+        cuts = CutsInARow()
         for blocks in self._run.sample_blocks(self._chosen.topic, self.names):
+            some = blocks.rows > 0
+            self.before = np.repeat(cuts.before(*blocks.spans[:, some]), blocks.rows[some])
             inside = self._chosen.inside(blocks.times)
-            signals = blocks.signals if inside is None else blocks.signals[:, inside]
+            signals = blocks.signals
+            if inside is not None:
+                signals, self.before = signals[:, inside], self.before[inside]
             if signals.shape[1]:
                 self.continuity.follow(signals[self.names.index(TIME)])
                 self.count += signals.shape[1]

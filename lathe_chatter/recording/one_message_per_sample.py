@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lathe_chatter.array_types import Integers
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.atomic_output import atomic_output
 from lathe_chatter.errors import RunExistsError
 from lathe_chatter.recording.export import Exported, ExportedParts, Progress
@@ -15,9 +15,9 @@ from lathe_chatter.recording.metadata_yaml import Topic
 from lathe_chatter.recording.recorded_file import Raw, offered_qos
 from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.recording.run import Run
-from lathe_chatter.recording.run_timeline import Timeline, read_timeline
+from lathe_chatter.recording.run_timeline import read_timeline
 from lathe_chatter.recording.run_writer import RunWriter
-from lathe_chatter.recording.sample_blocks import TIME
+from lathe_chatter.recording.sample_blocks import TIME, CutsInARow
 from lathe_chatter.recording.sample_series import Selection
 from lathe_chatter.samples.codec import encode_number
 
@@ -32,7 +32,7 @@ def unroll(
     """Write a run with one std_msgs/Float64 for each sample of each signal.
 
     The topics are `<samples>/<column>`, and the messages are dated by simulated time since the
-    epoch; where simulated time goes back, it is counted on from there. The messages of other
+    epoch; a cut that begins anew is counted on from the end of that before. The messages of other
     topics, as those of the monitor, stand among them at the simulated time at which they came,
     as far as ROS describes their types.
 
@@ -45,7 +45,7 @@ def unroll(
     topic = chosen.topic or run.samples_topic()
     parts = ExportedParts(run, chosen, progress)
     others = _others(run, topic, chosen)
-    written, base, last = 0, 0, 0
+    written = 0
     if path.exists():
         raise RunExistsError(path)
     with atomic_output(path) as folder, RunWriter(folder) as writer:
@@ -54,17 +54,14 @@ def unroll(
             writer.add_topic(topic_of_type(name, NUMBER_TYPE))
         time = parts.names.index(TIME)
         for part in parts:
-            for number, row in enumerate(part.tolist(), parts.count - len(part) + 1):
-                stamp = base + round(row[time] * 1e9)
-                if stamp <= last and number > 1:
-                    base += last
-                    stamp += last
-                last = stamp
+            stamps = _stamps(part[:, time], parts.before)
+            rows = zip(stamps.tolist(), part.tolist(), strict=True)
+            for number, (stamp, row) in enumerate(rows, parts.count - len(part) + 1):
                 for k, name in topics.items():
                     data = encode_number(row[k])
                     writer.write(name, data, log_time=stamp, publish_time=stamp, sequence=number)
                 written += len(topics)
-            while others and others[0][0] <= last:
+            while others and others[0][0] <= stamps[-1]:
                 _write(writer, *others.popleft())
             if written > _COMMIT_AFTER:
                 writer.commit_soon()
@@ -92,7 +89,7 @@ def _others(run: Run, samples: str, chosen: Selection) -> deque[tuple[int, Raw]]
     timeline, found = read_timeline(run, samples, lambda topic: topic != samples)
     if not len(timeline.last):
         return deque()
-    stamps = _stamps(timeline)
+    stamps = _stamps(timeline.last, CutsInARow().before(timeline.first, timeline.last))
     kept: list[tuple[int, Raw]] = []
     for each in found:
         schema = each.raw.schema
@@ -107,9 +104,6 @@ def _others(run: Run, samples: str, chosen: Selection) -> deque[tuple[int, Raw]]
     return deque(sorted(kept, key=lambda pair: pair[0]))
 
 
-def _stamps(timeline: Timeline) -> Integers:
-    """The dates of the last samples of blocks, ns, counted on where simulated time goes back."""
-    stamps = np.rint(timeline.last * 1e9).astype(np.int64)
-    for block in timeline.restarts.tolist():
-        stamps[block:] += stamps[block - 1]
-    return stamps
+def _stamps(times: Array, before: Array) -> Integers:
+    """Dates of samples by their simulated time and what was before their cuts, s; in ns."""
+    return np.rint((times + before) * 1e9).astype(np.int64)

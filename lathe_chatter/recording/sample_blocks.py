@@ -110,6 +110,27 @@ def one_cut(parts: Iterable[SampleBlocks], wanted: int) -> Iterator[SampleBlocks
         raise ParameterError('cut', wanted, '', f'a whole number from 0 to {cut}')
 
 
+class CutsInARow:
+    """Dates the blocks of several cuts behind each other, each where that before it ended."""
+
+    def __init__(self) -> None:
+        """Begin with the first."""
+        self._last, self._before = -np.inf, 0.0
+
+    def before(self, first: Array, last: Array) -> Array:
+        """How long the cuts took that were before those of some blocks, s (n,).
+
+        Args:
+            first: Simulated time of the first sample of each (n,); it goes back at a new cut.
+            last: Of the last one.
+        """
+        ends = np.concatenate(([self._last], last))
+        back = first <= ends[:-1]
+        before: Array = self._before + np.cumsum(np.where(back, ends[:-1], 0.0))
+        self._last, self._before = ends[-1], np.append(self._before, before)[-1]
+        return before
+
+
 class Stretch(NamedTuple):
     """Evenly spaced messages of samples with the same layout.
 

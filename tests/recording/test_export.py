@@ -85,13 +85,26 @@ def test_unrolled_each_sample_is_a_message_at_its_simulated_time(
     assert count == 7 * len(samples) + 1  # and the parameters
 
 
-def test_unrolled_stamps_go_on_where_simulated_time_goes_back(tmp_path: Path) -> None:
+def test_unrolled_cuts_follow_each_other_with_what_the_monitor_said(tmp_path: Path) -> None:
     with LatheRun(tmp_path / 'run', parameters_of(VirtualLathe())) as run:
-        run.write(VirtualLathe().advance(3))
-        run.write(VirtualLathe().advance(3))
-    assert main(['export', str(tmp_path / 'run'), '--unrolled', '--columns', 'cutting_force']) == 0
-    raw = read_run(tmp_path / 'run-unrolled').raw_messages('/lathe/samples/cutting_force')
-    assert [each.log_time for each in raw] == [k * 100_000 for k in (1, 2, 3, 4, 5, 6)]
+        for _ in range(3):
+            lathe = VirtualLathe()
+            run.write(lathe.advance(3))
+            run.publish('/chatter_monitor/chatter', BOOL, data=True)
+            run.write(lathe.advance(3))
+    chosen = {'whole': [], 'part': ['--start', '0.0001', '--end', '0.0004']}
+    for name, range_of_time in chosen.items():
+        out = str(tmp_path / name)
+        words = ['--unrolled', '--columns', 'cutting_force', '--output', out, *range_of_time]
+        assert main(['export', str(tmp_path / 'run'), *words]) == 0
+    for name, within in (('whole', 6), ('part', 4)):
+        unrolled = read_run(tmp_path / name)
+        raw = unrolled.raw_messages('/lathe/samples/cutting_force')
+        expected = [6 * cut + k for cut in range(3) for k in range(1, within + 1)]
+        assert [each.log_time for each in raw] == [100_000 * k for k in expected]
+        flags = [each.log_time for each in unrolled.raw_messages('/chatter_monitor/chatter')]
+        assert all(3 <= time / 100_000 - 6 * cut <= 6 for cut, time in enumerate(flags))
+        assert len(flags) == 3
 
 
 def test_nothing_is_overwritten(
