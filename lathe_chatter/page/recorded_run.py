@@ -69,6 +69,7 @@ class RecordedRun:
         self._low: Array = np.array([low for _, low, _ in glances])
         self._high: Array = np.array([high for _, _, high in glances])
         self._times: Array = self._places[:, 0]
+        self._only_glanced = True
         self._show('The first picture is of some places only.')
         self._size = sum(file.path.stat().st_size for file in self._run.opened) / 1e6
         self._show_reading(0.0)
@@ -166,7 +167,7 @@ class RecordedRun:
                 places.append(np.column_stack((on, np.full(len(on), offset), received)))
             passed += len(part.rows)
             self._show_reading(passed / expected if expected else last / max(self._end, 1e-9))
-        self._places = np.concatenate(places)
+        self._places, self._only_glanced = np.concatenate(places), False
         self._low, self._high = np.concatenate(lows), np.concatenate(highs)
         self._times = np.concatenate(numbers).astype(float) * length
         self._end = last
@@ -177,7 +178,12 @@ class RecordedRun:
     def _closely(self, begin: float, end: float) -> Array:
         """The samples between two times of the run, s, by times of the run (n, 6)."""
         on, offset, received = self._places.T
-        from_, to = np.interp((begin, end), on, received)
+        about = slice(
+            max(int(np.searchsorted(on, begin, 'right')) - 1, 0), int(np.searchsorted(on, end)) + 1
+        )
+        from_, to = received[about].min(), received[about].max()
+        if self._only_glanced:  # at places that are far from each other
+            from_, to = np.interp((begin, end), on, received)
         found = [
             self._chunk(file, place.offset)
             for file in self._run.opened
@@ -187,9 +193,12 @@ class RecordedRun:
         samples = np.concatenate([np.zeros((0, len(COLUMNS))), *(block for block, _ in found)])
         times = np.concatenate([np.zeros(0), *(times for _, times in found)])
         # Which session a sample is of is told by when it came.
-        samples[:, 0] += offset[np.maximum(np.searchsorted(received, times, 'right') - 1, 0)]
-        inside = (samples[:, 0] >= begin) & (samples[:, 0] <= end)
-        return samples[inside]
+        order = np.argsort(received, kind='stable')
+        latest = np.maximum(np.searchsorted(received[order], times, 'right') - 1, 0)
+        samples[:, 0] += offset[order[latest]]
+        samples = samples[(samples[:, 0] >= begin) & (samples[:, 0] <= end)]
+        in_order: Array = samples[np.argsort(samples[:, 0], kind='stable')]
+        return in_order
 
     # -- what is shown ---------------------------------------------------------------------
 

@@ -26,7 +26,9 @@ from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.page.live_signals import SIGNALS
 from lathe_chatter.page.recorded_run import RecordedRun
 from lathe_chatter.page.server import PageServer, Viewer
-from lathe_chatter.recording import LatheRun, read_run
+from lathe_chatter.recording import LatheRun, RunWriter, read_run
+from lathe_chatter.recording.ros_messages import topic_of_type
+from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 PATIENCE = 120.0
 
@@ -130,6 +132,26 @@ def test_sessions_follow_each_other_and_what_is_missing_stays_open(tmp_path: Pat
     time, place = first.columns['time'][restart:], first.columns[SIGNALS[0]][restart:]
     expected = place[(time >= 0.2 - 1e-9) & (time <= 0.21 + 1e-9)]
     np.testing.assert_allclose(columns(arrays)[0][:, 0], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize('step', [-2.0, 2.0])
+def test_a_close_look_does_not_end_where_the_clock_was_set(step: float, tmp_path: Path) -> None:
+    lathe, period = recorded_config({}).lathe(), 2_000_000
+    with RunWriter(tmp_path / 'run') as written:
+        written.add_topic(topic_of_type('/lathe/samples', SAMPLES_TYPE))
+        for k in range(1200):
+            stamp = 10**18 + k * period + (round(step * 1e9) if k >= 600 else 0)
+            block = encode_block(lathe.advance(20))
+            written.write('/lathe/samples', block, log_time=stamp, publish_time=stamp)
+            if k % 50 == 49:
+                written.commit()
+    shown = RecordedRun(tmp_path / 'run')
+    asyncio.run(shown.read())
+    for begin, end in ((1.17, 1.2), (1.19, 1.21), (1.2, 1.23)):
+        _, arrays = look(shown, do='view', plot='part', **{'from': begin, 'to': end})
+        times = begin + np.asarray(arrays['times'])
+        expected = read_run(tmp_path / 'run').samples(start=begin, end=end).columns['time']
+        np.testing.assert_allclose(times, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize('cell', FLAGS)
