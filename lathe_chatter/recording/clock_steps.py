@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 CLOCK = 'lathe_chatter/clock'
 """Name of the record of the steps, as JSON; a run without it had none that its writer saw."""
+STEP_BACK = 10_000_000
+"""ns by which stamps of one topic go back where the clock does, and never else."""
 _MIN_STEP = 10_000_000
 """ns: less is how a clock is set right by and by, or how long it takes to read two clocks."""
 _READING = 1_000_000

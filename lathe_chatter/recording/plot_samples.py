@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.plot_style import ALARM, axes_or_new, draw_band, grid, scale_for
+from lathe_chatter.recording.recorded_cuts import message_of
+from lathe_chatter.recording.run_timeline import read_timeline
 from lathe_chatter.samples.columns import UNITS
 from lathe_chatter.samples.extremes import TIME, Extremes
 
@@ -59,15 +63,26 @@ def plot_run(
     samples: Any = run.samples(of_samples)
     axes = plot_samples(samples, columns, axes)
     flags = (name for name in run.monitor_topics(of_samples) if name.endswith('/chatter'))
-    flag = next(flags, None)
-    raised: float | None = None
-    for recorded in run.messages(flag) if flag else ():
-        (time,) = samples.simulated_time([recorded.log_time]).tolist()
-        if recorded.message.data and raised is None:
-            raised = time
-        elif not recorded.message.data and raised is not None:
-            axes.axvspan(raised, time, color=ALARM, alpha=0.2, lw=0)
-            raised = None
-    if raised is not None:
-        axes.axvspan(raised, float(samples.block_ends[-1]), color=ALARM, alpha=0.2, lw=0)
+    if (flag := next(flags, None)) is not None:
+        for begin, end in _flagged(run, of_samples, flag):
+            axes.axvspan(begin, end, color=ALARM, alpha=0.2, lw=0)
     return axes
+
+
+def _flagged(run: Run, samples: str, flag: str) -> Iterator[tuple[float, float]]:
+    """From when to when a flag was up, s: of each cut by itself, as their times overlap."""
+    timeline, found = read_timeline(run, samples, flag.__eq__)
+    ends = [*timeline.restarts.tolist(), len(timeline.first)]
+    told = [(timeline.steady(each)[0], message_of(each).data) for each in found]
+    up = False
+    for begin, end in pairwise([0, *ends]):
+        until = timeline.received[end] if end < len(timeline.first) else math.inf
+        raised = float(timeline.first[begin])
+        while told and told[0][0] < until:
+            received, now = told.pop(0)
+            time = timeline.simulated_time(received, slice(begin, end))
+            if up and not now:
+                yield raised, time
+            raised, up = raised if up else time, now
+        if up:
+            yield raised, float(timeline.last[end - 1])

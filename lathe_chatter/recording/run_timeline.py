@@ -16,14 +16,12 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.recording.chunk_messages import Messages
-from lathe_chatter.recording.clock_steps import CLOCK, noted_steps
+from lathe_chatter.recording.clock_steps import CLOCK, STEP_BACK, noted_steps
 from lathe_chatter.recording.recorded_file import Raw, RecordedFile
 from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.samples.mixed_streams import mixed_at
 
-_STEP_BACK = 10_000_000
-"""ns by which stamps of one topic go back where the clock does, and never else."""
 _SAME_PLACE = 1_000_000_000
 """ns: simulated time that goes back so near to where the lathe said it does is the same event."""
 
@@ -110,7 +108,8 @@ class Timeline:
     def received_in(self, spans: Sequence[tuple[float, float]]) -> list[tuple[int, int]]:
         """Between which stamps the samples of some spans of simulated time, s, were received."""
         stamps = self.received + self.offsets
-        until = np.append(stamps[1:], np.iinfo(np.int64).max)  # a run may grow while it is read
+        until = stamps.copy()
+        until[-1:] = np.iinfo(np.int64).max  # a run may grow while it is read
         found = [(self.last >= begin) & (self.first <= end) for begin, end in spans]
         return [(int(stamps[k].min()), int(until[k].max())) for k in found if k.any()]
 
@@ -226,7 +225,7 @@ def _timeline(run: Run, places: Integers, blocks: list[_Ends]) -> Timeline:
     times = np.concatenate([np.zeros((0, 2)), *(each.times for each in blocks)])[:count][some]
     # A forward step is no disorder: it looks like a pause, and only the recorder can tell it.
     passed = np.diff(received)
-    back = np.flatnonzero(passed < -_STEP_BACK)
+    back = np.flatnonzero(passed < -STEP_BACK)
     usual = int(np.median(passed)) if len(passed) else 0
     offsets = np.zeros(len(received), np.int64)
     for place in back:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LayoutError, ParameterError
+from lathe_chatter.recording.clock_steps import STEP_BACK
 from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.samples.continuity import Continuity, time_text
 
@@ -84,12 +85,24 @@ class Samples(NamedTuple):
     def simulated_time(self, log_times: ArrayLike) -> Array:
         """Simulated times when other things were recorded, s: those of the blocks about them.
 
+        A clock that was set back showed the same twice: of what came then it is nan, as nothing
+        says which time it was.
+
         Args:
             log_times: Of these, ns since the epoch (m,).
         """
         relative = (self.log_times - self.log_times[0]).astype(float)
-        asked = np.asarray(log_times, np.int64) - self.log_times[0]
-        found: Array = np.interp(asked.astype(float), relative, self.block_ends)
+        asked = (np.asarray(log_times, np.int64) - self.log_times[0]).astype(float)
+        found: Array = np.full(asked.shape, np.nan)
+        answers = np.zeros(asked.shape, int)
+        set_back = np.flatnonzero(np.diff(relative) < -STEP_BACK) + 1
+        for blocks in np.split(np.arange(len(relative)), set_back):
+            begin, end = relative[blocks[0]], relative[blocks[-1]]
+            inside = (asked >= begin) | (begin == relative.min())
+            inside &= (asked <= end) | (end == relative.max())
+            found[inside] = np.interp(asked[inside], relative[blocks], self.block_ends[blocks])
+            answers += inside
+        found[answers > 1] = np.nan
         return found
 
     def plot(self, *columns: str, axes: Axes | None = None) -> Axes:

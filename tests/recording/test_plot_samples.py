@@ -7,13 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from support.recorded import BOOL
 from support.two_lathes import FLAGS, record_two_lathes
 
 import lathe_chatter as lc
 from lathe_chatter.errors import ParameterError
+from lathe_chatter.recording.ros_messages import message_bytes, topic_of_type
+from lathe_chatter.recording.run_writer import RunWriter
+from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 HERE = Path(__file__).parent
 RUN = HERE.parent / 'golden' / 'run'
+FLAG = '/chatter_monitor/chatter'
 
 
 def test_samples_are_plotted_into_the_axes_given() -> None:
@@ -41,6 +46,47 @@ def test_a_run_is_plotted_with_what_the_monitor_flagged(tmp_path: Path) -> None:
         'tool displacement',
         'workpiece displacement',
     ]
+
+
+def shades_of(run: lc.Run) -> list[tuple[float, float]]:
+    """From when to when chatter is drawn, s."""
+    axes = run.plot(axes=Figure().subplots())
+    extents = [patch.get_extents() for patch in axes.patches]
+    found = [each.transformed(axes.transData.inverted()) for each in extents]
+    return [(round(each.x0, 3), round(each.x1, 3)) for each in found]
+
+
+def record_flags(folder: Path, *, step: float = 0.0, restart: bool = False) -> lc.Run:
+    """A flag every 0.1 s, up and down; the clock steps at 0.25 s, or the lathe at 0.15 s."""
+    lathe, now = lc.VirtualLathe(), 10**18
+    with RunWriter(folder) as writer:
+        writer.add_topic(topic_of_type('/lathe/samples', SAMPLES_TYPE))
+        writer.add_topic(topic_of_type(FLAG, BOOL))
+        for k in range(300):
+            now += round(step * 1e9) if k == 125 else 0
+            if restart and k == 75:
+                lathe = lc.VirtualLathe()
+            now += 2_000_000
+            stamps = {'log_time': now, 'publish_time': now}
+            writer.write('/lathe/samples', encode_block(lathe.advance(20)), **stamps)
+            if k % 50 == 49:
+                writer.write(FLAG, message_bytes(BOOL, data=k % 100 < 50), **stamps)
+    return lc.read_run(folder)
+
+
+def test_a_flag_stands_where_it_was_whatever_the_clock_did(tmp_path: Path) -> None:
+    run = record_flags(tmp_path / 'run', step=-0.2)
+    assert shades_of(run) == [(0.1, 0.2), (0.3, 0.4), (0.5, 0.6)]
+    samples = run.samples()
+    stamps = [10**18 + round(time * 1e9) for time in (0.02, 0.04, 0.1, 0.24, 0.26, 0.5)]
+    found = samples.simulated_time(stamps)
+    # The clock showed what it shows from 0.052 to 0.25 s a second time.
+    assert found == pytest.approx([0.02, 0.04, np.nan, np.nan, 0.46, 0.6], nan_ok=True)
+
+
+def test_a_flag_that_is_up_when_a_lathe_is_reset_ends_with_its_cut(tmp_path: Path) -> None:
+    run = record_flags(tmp_path / 'run', restart=True)
+    assert shades_of(run) == [(0.1, 0.15), (0.0, 0.05), (0.15, 0.25), (0.35, 0.45)]
 
 
 @pytest.mark.parametrize(
