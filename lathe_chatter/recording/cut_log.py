@@ -40,6 +40,7 @@ class CutSession:
         events: Changes and knocks in the order in which they took effect.
         parameters: Of the lathe at time zero, by name; empty where the record does not say.
         noted: The same by what it answered when it was asked, as far as that is in the record.
+        noted_at: When it answered, ns since the epoch.
         announced: The same by what it declared.
         contradictions: Where these, or the sentences of its log, do not fit; sentences.
         blocks: Its samples, among the blocks of a `Timeline`.
@@ -50,6 +51,7 @@ class CutSession:
     events: list[Change | Knock] = field(default_factory=list)
     parameters: dict[str, Any] = field(default_factory=dict)
     noted: dict[str, Any] = field(default_factory=dict)
+    noted_at: int = 0
     announced: dict[str, Any] = field(default_factory=dict)
     contradictions: list[str] = field(default_factory=list)
     blocks: slice = field(default_factory=lambda: slice(0, 0))
@@ -59,6 +61,14 @@ class CutSession:
     def changes(self) -> Iterator[Change]:
         """The changes of the cut, in order."""
         return (each for each in self.events if isinstance(each, Change))
+
+    @property
+    def at_its_end(self) -> dict[str, Any]:
+        """Its parameters as the last of its changes left them; empty where they are not known."""
+        values = dict(self.parameters)
+        for change in self.changes if values else ():
+            values |= _plain(change.new)
+        return values
 
     def add(self, event: Change | Knock, published: int) -> None:
         """Something happened, published in ns since the epoch."""
@@ -137,7 +147,7 @@ class CutLog:
             until = _END if last else self.sessions[after].begun
             for values, at in noted:
                 if (session.begun if first else 0) <= at < until:
-                    session.noted = dict(values)
+                    session.noted, session.noted_at = dict(values), at
                     break
             session.announced = {}
             for values, at in announced:

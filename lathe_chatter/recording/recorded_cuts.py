@@ -48,6 +48,18 @@ class RecordedCuts:
         return self.sampled[-1]
 
     @property
+    def unseen(self) -> float:
+        """For how long before the first samples changes of the cut are not in the record, s.
+
+        Of a file of a run without those before it, the parameters are of the start of them all.
+        """
+        first = self.sampled[0]
+        published = int(self.timeline.published[first.blocks.start])
+        if first.beginning or not 0 < first.noted_at < published - _LATE:
+            return 0.0
+        return (published - first.noted_at) / 1e9
+
+    @property
     def sampled(self) -> list[CutSession]:
         """The sessions of which there are samples."""
         return [each for each in self.log.sessions if each.blocks.start < each.blocks.stop]
@@ -104,10 +116,14 @@ def _assign_blocks(log: CutLog, timeline: Timeline) -> None:
     """Give each session its samples, and add those of which the log has no word."""
     sessions = log.sessions
     begins = [timeline.block_at(session.begun) for session in sessions]
-    first = sessions[0]
-    if begins[0] and timeline.published[0] < first.begun - _LATE:
-        sessions.insert(0, CutSession())
-        begins.insert(0, 0)
+    begin, begun, published = begins[0], sessions[0].begun, timeline.published
+    if begin:
+        before = begun - int(published[0])
+        # Where simulated time goes back just there they are, however short before.
+        goes_back = begin in timeline.restarts and abs(begun - int(published[begin])) < before
+        if goes_back or before > _LATE:
+            sessions.insert(0, CutSession())
+            begins.insert(0, 0)
     begins[0] = 0
     for block in timeline.restarts:
         if block not in begins:

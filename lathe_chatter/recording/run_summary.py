@@ -99,16 +99,23 @@ def _verdicts(
     """Of each cut of a lathe, in order: what the linear model says of it."""
     cut_log = log.cut_log_of(topic.removesuffix('/samples'))
     cut_log.assign_parameters(noted)
-    return [each for session in cut_log.sessions for each in _verdicts_in(session)]
+    received = log.samples[topic]
+    begins = [received.first or 0.0 if received.head else 0.0]
+    begins += [0.0] * (len(cut_log.sessions) - 1)
+    return [
+        verdict
+        for session, begin in zip(cut_log.sessions, begins, strict=True)
+        for verdict in _verdicts_in(session, begin)
+    ]
 
 
-def _verdicts_in(session: CutSession) -> list[dict[str, Any]]:
-    """Of each cut of a session."""
+def _verdicts_in(session: CutSession, begin: float) -> list[dict[str, Any]]:
+    """Of each cut of a session, of which there are samples from some time on, s."""
     if not session.parameters:
         return []
     try:
         machine, cut = machine_from(session.parameters), cut_from(session.parameters)
-        verdicts = [_verdict(0.0, machine, cut)]
+        verdicts = [_verdict(begin, machine, cut)]
         for change in session.changes:
             cut = cut.with_changes(**change.new)
             verdicts.append(_verdict(change.time, machine, cut))

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING
+from lathe_chatter.recording.cut_log import logger_of
 from lathe_chatter.recording.metadata_yaml import Topic
+from lathe_chatter.recording.provenance import PARAMETERS, parameter_values
 from lathe_chatter.recording.recording_statistics import RunLog
+from lathe_chatter.recording.ros_messages import LOG_TYPE, types
 from lathe_chatter.recording.run_summary import note_end
 from lathe_chatter.recording.run_writer import RunWriter
 
 SNAPSHOT = 'lathe_chatter/snapshot'
 """Name of the record of a run that is the end of a longer one: `seconds`, and `reason`."""
+_LONGER = 1.0
+"""s for which a log is kept longer: what it says may be of samples that came later."""
+_NEVER = 2**63
+
+_Answers = Sequence[tuple[Mapping[str, Any], int]]
 
 
 class _Message(NamedTuple):
@@ -41,6 +50,8 @@ class SnapshotBuffer:
         self._topics: dict[str, Topic] = {}
         self._messages: deque[_Message] = deque()
         self._kept: dict[str, deque[_Message]] = {}
+        self._log: deque[_Message] = deque()
+        self._past = RunLog()
         self._notes: dict[str, dict[str, str]] = {}
         self._files: list[Path] = []
 
@@ -62,9 +73,14 @@ class SnapshotBuffer:
         self._messages.append(message)
         while self._messages[0].taken < now - self.seconds:
             old = self._messages.popleft()
-            if old.topic.repeated:
+            if old.topic.type == LOG_TYPE:
+                self._log.append(old)
+            elif old.topic.repeated:
                 kept = self._kept.setdefault(old.topic.name, deque(maxlen=old.topic.repeated))
                 kept.append(old)
+        while self._log and self._log[0].taken < now - self.seconds - _LONGER:
+            old = self._log.popleft()
+            self._past.receive(old.topic.name, LOG_TYPE, old.data, old.log_time, old.publish_time)
 
     def note(self, name: str, values: Mapping[str, str]) -> None:
         """Keep named values for the runs to come."""
@@ -83,7 +99,7 @@ class SnapshotBuffer:
         self,
         folder: Path,
         reason: str,
-        parameters: Mapping[str, list[tuple[dict[str, Any], int]]],
+        parameters: Mapping[str, _Answers],
         **options: Any,
     ) -> int:
         """Write what is kept as a run of its own, and go on.
@@ -104,10 +120,13 @@ class SnapshotBuffer:
         """
         log = RunLog()
         older = [message for kept in self._kept.values() for message in kept]
-        messages = [*older, *self._messages]
+        messages = [*older, *self._log, *self._messages]
+        parameters = {name: self._since(name, told, messages) for name, told in parameters.items()}
         with RunWriter(folder, **options) as writer:
             for name, values in self._notes.items():
                 writer.note(name, values)
+            for node, answers in parameters.items():
+                writer.note(PARAMETERS + node, parameter_values(answers))
             for file in self._files:
                 writer.attach_file(file)
             for each in messages:
@@ -119,3 +138,25 @@ class SnapshotBuffer:
             note_end(writer, log, parameters)
             writer.commit()
         return len(messages)
+
+    def _since(self, lathe: str, answers: _Answers, messages: Sequence[_Message]) -> _Answers:
+        """The parameters of a lathe as they are where some messages begin, and of those after it.
+
+        What it answered is of its start, and what was changed since is no longer in memory.
+        """
+        first, begins = 0, _NEVER
+        for each in messages:
+            if each.topic.name == f'{lathe}/samples':
+                first = first or each.publish_time
+            elif each.topic.type == LOG_TYPE:
+                message = types().deserialize_cdr(each.data, LOG_TYPE)
+                if message.name == logger_of(lathe) and message.msg == BEGINNING:
+                    begins = each.publish_time
+                    break
+        log = self._past.cut_log_of(lathe)
+        log.assign_parameters([each for each in answers if each[1] < begins])
+        values = log.sessions[-1].at_its_end
+        if begins == _NEVER and not (values and first):
+            return answers
+        here = [(values, first)] if values and first else []
+        return [*here, *(each for each in answers if each[1] >= begins)]

@@ -370,6 +370,11 @@ def _remarks(cuts: RecordedCuts, lathe: str) -> list[str]:
     remarks = [
         f'At {time:.3f} s {step_sentence(seconds)}' for time, seconds in cuts.timeline.steps
     ]
+    if cuts.unseen:
+        remarks.append(
+            f'The parameters at the start are of {cuts.unseen:.3f} s before the first sample: '
+            'whether the cut was changed in between is not in the record.'
+        )
     remarks += cuts.log.contradictions
     said = [message_of(each) for each in cuts.messages if each.raw.topic == LOG]
     remarks += [

@@ -399,3 +399,43 @@ def test_a_run_that_was_stopped_says_so(tmp_path: Path) -> None:
         'The run ended early. It failed: what',
         'The run ended early. It was interrupted.',
     ]
+
+
+def test_the_last_samples_before_a_step_are_found_where_a_file_ends_there(tmp_path: Path) -> None:
+    record = Record(tmp_path / 'run')
+    lathe = record.start(VirtualLathe(), asked=True)
+    record.cut(lathe, 200)
+    record.writer.split()
+    record.step = -2_000_000_000
+    record.cut(lathe, 200)
+    record.writer.close()
+    (excerpt,) = read_history(tmp_path / 'run').samples.between([(0.3985, 0.4)])
+    assert np.rint(1e4 * excerpt['time']).tolist() == [*range(3986, 4001)]
+
+
+def test_a_lathe_that_is_started_anew_soon_after_the_record_began_is_another(
+    tmp_path: Path,
+) -> None:
+    record = Record(tmp_path / 'run')
+    record.cut(VirtualLathe(cut=Cut(depth_of_cut=0.0004)), 100)
+    record.cut(record.start(VirtualLathe(cut=Cut(depth_of_cut=0.0006))), 100)
+    record.writer.close()
+    first, second = cuts_of(tmp_path / 'run').sampled
+    assert (first.beginning, second.beginning) == ('', BEGINNING)
+    assert not first.parameters
+    assert second.parameters['depth_of_cut'] == 0.0006
+
+
+def test_a_file_without_those_before_it_may_have_another_cut_than_that_of_the_start(
+    tmp_path: Path,
+) -> None:
+    record = Record(tmp_path / 'run')
+    lathe = record.start(VirtualLathe(), asked=True)
+    record.change(lathe, depth_of_cut=0.0007)
+    record.cut(lathe, 1000)
+    record.writer.split()
+    record.cut(lathe, 100)
+    record.writer.close()
+    assert not read_history(tmp_path / 'run').remarks
+    (said,) = read_history(tmp_path / 'run' / 'run_1.mcap').remarks
+    assert 'are of 2.002 s before the first sample: whether the cut was changed' in said
