@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,10 @@ from lathe_chatter.errors import MixedSamplesError, RunReadError
 from lathe_chatter.recording.cut_log import CutLog, CutSession, Parameters, logger_of
 from lathe_chatter.recording.decoding import decoded
 from lathe_chatter.recording.provenance import PARAMETERS, parameter_history
-from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.run_timeline import Placed, Timeline, read_timeline
+
+if TYPE_CHECKING:
+    from lathe_chatter.recording.run import Run
 
 LOG, _EVENTS = '/rosout', '/parameter_events'
 _KINDS = {1: 'bool_value', 2: 'integer_value', 3: 'double_value', 4: 'string_value'}

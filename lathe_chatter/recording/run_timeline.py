@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,9 +18,11 @@ from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.recording.chunk_messages import Messages
 from lathe_chatter.recording.clock_steps import CLOCK, STEP_BACK, noted_steps
 from lathe_chatter.recording.recorded_file import Raw, RecordedFile
-from lathe_chatter.recording.run import Run
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
 from lathe_chatter.samples.mixed_streams import mixed_at
+
+if TYPE_CHECKING:
+    from lathe_chatter.recording.run import Run
 
 _SAME_PLACE = 1_000_000_000
 """ns: simulated time that goes back so near to where the lathe said it does is the same event."""
