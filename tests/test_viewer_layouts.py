@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -56,9 +57,15 @@ def shape(request: pytest.FixtureRequest) -> tuple[Run, str, dict[str, set[str]]
     return run, ending, UNROLLED if ending else SHOWN
 
 
+@cache
+def first_message(run: Path, topic: str) -> Any:
+    """Of a topic: to read what is unrolled takes a second, and many curves are of few topics."""
+    return next(iter(read_run(run).messages(topic))).message
+
+
 def value_at(run: Run, topic: str, place: str) -> Any:
     """What stands at `data` or `data[k]` in the first message of a topic."""
-    message = next(iter(run.messages(topic))).message
+    message = first_message(run.path, topic)
     found = re.fullmatch(r'data(?:\[(\d+)\])?', place)
     assert found, place
     return message.data if found[1] is None else message.data[int(found[1])]

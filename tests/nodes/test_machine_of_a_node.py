@@ -23,7 +23,7 @@ def test_a_cell_has_the_machine_of_a_file(
     nodes.start('run_recorder', f'output:={run}')
     nodes.start('lathe', f'machine:={machine}')
     nodes.start('chatter_monitor', 'model:=lathe')
-    bench.spin_until(lambda: len(samples) > 5_000, 'samples')
+    bench.spin_until(lambda: len(samples) > 1_000, 'samples')
     listed = bench.call(ListParameters, '/lathe/list_parameters', ListParameters.Request())
     single = len(load_machine(machine).machine.tool.modes) == 1
     assert ('tool.mass' in listed.result.names) is single
