@@ -17,10 +17,14 @@ _NUMBERED = re.compile(r'^(?P<run>.*)_(?P<number>\d+)$')
 _OTHER_FORMATS = {
     b'SQLite format 3\0': 'a bag in SQLite',
     b'#ROSBAG V': 'a bag of ROS 1',
-    b'\x28\xb5\x2f\xfd': 'a file compressed by zstd',
-    b'\x04\x22\x4d\x18': 'a file compressed by lz4',
 }
 """What files begin with that hold recorded messages in another way."""
+_COMPRESSED = {
+    b'\x28\xb5\x2f\xfd': ('zstd', 'zstd -d {} -o {}'),
+    b'\x04\x22\x4d\x18': ('lz4', 'lz4 -d {} {}'),
+    b'\x1f\x8b': ('gzip', 'gzip -dc {} > {}'),
+}
+"""What compressed files begin with, how they are compressed, and what undoes it."""
 _UNREADABLE = (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError)
 """What reading a metadata.yaml raises that is not there, or is no such thing."""
 
@@ -54,9 +58,7 @@ def run_folder(folder: Path) -> RunFolder:
         wrong = 'is neither a file nor a folder' if folder.exists() else 'does not exist'
         raise RunReadError(f'{folder} {wrong}.')
     metadata, listed = _described(folder)
-    mode = str((metadata or {}).get('compression_mode') or 'none').lower()
-    if mode != 'none':
-        raise RunReadError(_refusal(folder, f'a bag compressed by {mode}', folder))
+    _refuse_compressed(metadata, folder, folder)
     there = sorted((file for file in folder.glob('*.mcap') if file.is_file()), key=_split)
     if not there:
         for file in sorted(folder.iterdir()):
@@ -87,19 +89,41 @@ def refuse_other_format(file: Path, asked: Path | None = None) -> None:
     """
     if not file.is_file():
         return
+    metadata, listed = _described(file.parent)
+    if asked is None and file.name in listed:
+        _refuse_compressed(metadata, file, file.parent)
     with file.open('rb') as stream:
         begin = stream.read(16)
+    for magic, (name, command) in _COMPRESSED.items():
+        if begin.startswith(magic):
+            end = '-plain.mcap' if file.suffix == '.mcap' else ''
+            target = f'{file.with_suffix("")}{end}'
+            made = command.format(shlex.quote(str(file)), shlex.quote(target))
+            raise RunReadError(_refusal(asked or file, f'a file compressed by {name}', made))
     for magic, name in _OTHER_FORMATS.items():
         if begin.startswith(magic):
-            source = file if magic.startswith(b'#ROSBAG') else asked or file.parent
-            raise RunReadError(_refusal(asked or file, name, source))
+            alone = magic.startswith(b'#ROSBAG') or file.name not in listed
+            source = file if alone else file.parent
+            raise RunReadError(_refusal(asked or file, name, _conversion(source)))
 
 
-def _refusal(path: Path, what: str, source: Path) -> str:
-    """One sentence: what it is, and what makes of it what can be read."""
+def _refuse_compressed(metadata: dict[str, Any] | None, asked: Path, bag: Path) -> None:
+    """Refuse a bag whose messages or files are compressed each by itself."""
+    mode = str((metadata or {}).get('compression_mode') or 'none').lower()
+    if mode != 'none':
+        what = f'{"" if asked == bag else "of "}a bag compressed by {mode}'
+        raise RunReadError(_refusal(asked, what, _conversion(bag)))
+
+
+def _conversion(source: Path) -> str:
     target = f'{source.resolve().with_suffix("")}-mcap'
     words = ['rosbags-convert', '--src', str(source), '--dst', target, '--dst-storage', 'mcap']
-    return f'{path} is {what}, and only plain MCAP is read: `{shlex.join(words)}` makes one of it.'
+    return shlex.join(words)
+
+
+def _refusal(path: Path, what: str, command: str) -> str:
+    """One sentence: what it is, and what makes of it what can be read."""
+    return f'{path} is {what}, and only plain MCAP is read: `{command}` makes one of it.'
 
 
 def _described(folder: Path) -> tuple[dict[str, Any] | None, list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 import struct
 import subprocess
 import sys
@@ -148,7 +149,28 @@ def test_bags_that_are_no_plain_mcap_are_named_with_the_command_that_converts_th
     plain = converted(refused.value)
     assert array_of(plain).tobytes() == np.concatenate(blocks).tobytes()
     assert verify(plain).complete
-    if mode is not CompressionMode.MESSAGE:
-        (file,) = (each for each in (tmp_path / 'a run').iterdir() if each.suffix != '.yaml')
-        with pytest.raises(RunReadError, match=r'is a (bag in SQLite|file compressed by zstd)'):
-            read_run(file)
+    (file,) = (each for each in (tmp_path / 'a run').iterdir() if each.suffix != '.yaml')
+    with pytest.raises(RunReadError, match=rf'is (of )?{what}, and only plain MCAP') as refused:
+        read_run(file)
+    assert f"--src '{tmp_path / 'a run'}'" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ('program', 'ending'), [('zstd', '.zstd'), ('zstd', ''), ('lz4', '.lz4'), ('gzip', '.gz')]
+)
+def test_a_compressed_file_alone_is_named_with_the_command_that_unpacks_it(
+    program: str, ending: str, blocks: list[Array], tmp_path: Path
+) -> None:
+    if shutil.which(program) is None:
+        pytest.skip(f'{program} is not here')
+    plain = write(tmp_path / 'a.mcap', blocks)
+    packed = subprocess.run([program, '-c', str(plain)], check=True, capture_output=True).stdout
+    plain.unlink()
+    file = tmp_path / f'a.mcap{ending}'
+    file.write_bytes(packed)
+    with pytest.raises(RunReadError, match=f'is a file compressed by {program}') as refused:
+        read_run(file)
+    command = str(refused.value).split('`')[1]
+    subprocess.run(['sh', '-c', command], check=True, capture_output=True)
+    target = tmp_path / ('a.mcap' if ending else 'a-plain.mcap')
+    assert array_of(target).tobytes() == np.concatenate(blocks).tobytes()
