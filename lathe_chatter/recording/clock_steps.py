@@ -7,6 +7,10 @@ import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
+from lathe_chatter.array_types import Integers
+
 CLOCK = 'lathe_chatter/clock'
 """Name of the record of the steps, as JSON; a run without it had none that its writer saw."""
 STEP_BACK = 10_000_000
@@ -76,6 +80,20 @@ class ClockWatch:
             first, wall, last = self._clock(), self._wall(), self._clock()
             if last - first < _READING:
                 return wall, first
+
+
+def steps_back(stamps: Integers) -> tuple[Integers, Integers]:
+    """After which messages of a topic the clock was set back, and how far it went (below 0), ns.
+
+    A step forward is not seen: it looks like a pause.
+
+    Args:
+        stamps: When each was received, ns since the epoch (n,).
+    """
+    passed = np.diff(stamps)
+    usual = int(np.median(passed)) if len(passed) else 0
+    places = np.flatnonzero(passed < -STEP_BACK)
+    return places, passed[places] - usual
 
 
 def noted_steps(values: Mapping[str, str]) -> list[ClockStep]:

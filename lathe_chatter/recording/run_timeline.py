@@ -16,9 +16,10 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.recording.chunk_messages import Messages
-from lathe_chatter.recording.clock_steps import CLOCK, STEP_BACK, noted_steps
+from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, steps_back
 from lathe_chatter.recording.recorded_file import Raw, RecordedFile
 from lathe_chatter.recording.sample_blocks import TIME, SampleBlocks
+from lathe_chatter.recording.sample_order import is_mixed_up
 from lathe_chatter.samples.mixed_streams import mixed_at
 
 if TYPE_CHECKING:
@@ -149,6 +150,8 @@ def read_timeline(
 ) -> tuple[Timeline, list[Placed]]:
     """Read when the blocks of a lathe were written, and other messages with their places.
 
+    A file whose samples are handed out in the order of reception is taken in this order.
+
     Args:
         run: Which.
         samples: Topic of the lathe's samples.
@@ -161,16 +164,40 @@ def read_timeline(
     found: list[Placed] = []
     places: list[Integers] = []
     written = 0
-    for file, contents in run.contents():
+    for file in run.opened:
+        messages, of_samples, there = _in_file(file, samples, others)
+        found += [each._replace(place=written + each.place) for each in messages]
+        places.append(written + of_samples)
+        written += there
+    blocks = [_ends(each) for each in run.sample_blocks(samples, (TIME,))]
+    return _timeline(run, _joined(places), blocks), found
+
+
+def _in_file(
+    file: RecordedFile, samples: str, others: Callable[[str], bool]
+) -> tuple[list[Placed], Integers, int]:
+    """Wanted messages of a file, the places of those with samples, and how many there are."""
+    found: list[Placed] = []
+    places: list[Integers] = []
+    received: list[Integers] = []
+    written = 0
+    for contents in file.contents():
         messages, channels = contents.messages, file.known.channels
         topics = tuple(channel.topic for channel in channels.values() if others(channel.topic))
         if topics:
             here = (written + _places(file, messages, topics)).tolist()
             found += map(Placed, file.raw_of(messages, topics), here)
         places.append(written + _places(file, messages, (samples,)))
+        received.append(messages.heads['log_time'].astype(np.int64))
         written += len(messages.heads)
-    blocks = [_ends(each) for each in run.sample_blocks(samples, (TIME,))]
-    return _timeline(run, _joined(places), blocks), found
+    of_samples = _joined(places)
+    if not is_mixed_up(file, samples):
+        return found, of_samples, written
+    # As the samples are handed out.
+    rank = np.empty(written, np.int64)
+    rank[np.argsort(_joined(received), kind='stable')] = np.arange(written)
+    placed = [each._replace(place=int(rank[each.place])) for each in found]
+    return sorted(placed, key=lambda each: each.place), np.sort(rank[of_samples]), written
 
 
 def _places(file: RecordedFile, messages: Messages, topics: tuple[str, ...]) -> Integers:
@@ -225,15 +252,14 @@ def _timeline(run: Run, places: Integers, blocks: list[_Ends]) -> Timeline:
     received = _joined([each.received for each in blocks])[:count][some]
     published = _joined([each.published for each in blocks])[:count][some]
     times = np.concatenate([np.zeros((0, 2)), *(each.times for each in blocks)])[:count][some]
-    # A forward step is no disorder: it looks like a pause, and only the recorder can tell it.
-    passed = np.diff(received)
-    back = np.flatnonzero(passed < -STEP_BACK)
-    usual = int(np.median(passed)) if len(passed) else 0
-    offsets = np.zeros(len(received), np.int64)
-    for place in back:
-        offsets[place + 1 :] += int(passed[place]) - usual
+    back, sizes = steps_back(received)
+    since = np.zeros(len(received), np.int64)
+    since[back + 1] = sizes
+    offsets = np.cumsum(since)
     received = received - offsets
-    steps = [(int(place), float(passed[place] - usual) / 1e9) for place in back]
+    steps = [
+        (place, size / 1e9) for place, size in zip(back.tolist(), sizes.tolist(), strict=True)
+    ]
     notes = [note.values for note in run.notes() if note.name == CLOCK]
     noted = noted_steps(notes[-1]) if notes else []
     if noted:  # by who saw it, so also those forward

@@ -38,7 +38,7 @@ def sample_blocks(
             # What is out of order is so within a chunk, and no chunk is halved here.
             in_order = (blocks.log_times[1:] >= blocks.log_times[:-1]).all()
             yield blocks if in_order else _better(blocks)
-    elif _was_mixed_up(file, topic):
+    elif is_mixed_up(file, topic):
         yield from as_received(file, topic, wanted)
     else:
         yield from as_written(file, topic, wanted)
@@ -49,8 +49,17 @@ def _better(blocks: SampleBlocks) -> SampleBlocks:
     return received if _steps_back(received.spans) < _steps_back(blocks.spans) else blocks
 
 
-def _was_mixed_up(file: RecordedFile, topic: str) -> bool:
-    """Whether simulated time goes back less often by reception than as written."""
+def is_mixed_up(file: RecordedFile, topic: str) -> bool:
+    """Whether the samples of a topic in a file are handed out in the order of reception.
+
+    Simulated time goes back less often then than as they were written.
+
+    Raises:
+        OSError: If the file cannot be read.
+        LayoutError: If a message is no block of samples.
+    """
+    if file.in_time_order:
+        return False
     written = [(blocks.spans, blocks.log_times) for blocks in as_written(file, topic, ())]
     if not written:
         return False

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LayoutError
-from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, step_sentence
+from lathe_chatter.recording.clock_steps import CLOCK, noted_steps, step_sentence, steps_back
 from lathe_chatter.recording.file_completeness import (
     check_end,
     check_files,
@@ -167,9 +168,13 @@ def _check_samples(found: Verification, progress: Progress) -> None:
             continue
         continuity = MixedContinuity(remember=True)
         count, first, last, strange = 0, math.nan, math.nan, 0
+        received: list[Integers] = [np.zeros(0, np.int64)]
+        spans: list[Array] = [np.zeros((2, 0))]
         try:
             for block in found.run.sample_blocks(topic, columns=()):
                 progress(len(block.rows))
+                received.append(block.log_times)
+                spans.append(block.spans)
                 times = block.times
                 if not len(times):
                     continue
@@ -181,6 +186,7 @@ def _check_samples(found: Verification, progress: Progress) -> None:
         except (LayoutError, ValueError) as error:
             found.add_loss(f'{topic}: {error} What comes after it was not looked at.')
         found.samples[topic] = SampleCount(count, first, last)
+        _report_steps(found, topic, np.concatenate(received), np.hstack(spans))
         if strange:
             found.add_loss(f'{topic}: the times of {strange} samples are no numbers.')
         late = missing_in((0.0, first), continuity.step) if count and continuity.step else 0
@@ -197,6 +203,21 @@ def _check_samples(found: Verification, progress: Progress) -> None:
                 f'{continuity.mixed} times there: whether any are missing cannot be told.'
             )
         _report_breaks(found, topic, continuity)
+
+
+def _report_steps(found: Verification, topic: str, received: Integers, spans: Array) -> None:
+    """Say where the clock was set back that dates samples, unless the recorder has noted it.
+
+    Where simulated time goes back too, a writer may have dated its samples by that.
+    """
+    if any(note.name == CLOCK for note in found.run.notes()):
+        return
+    places, sizes = steps_back(received)
+    for place, size in zip(places.tolist(), sizes.tolist(), strict=True):
+        if spans[0, place + 1] <= spans[1, place]:
+            continue
+        said = step_sentence(size / 1e9)
+        found.remark(f'{topic}: at {_clock(int(received[place]) / 1e9)} {said}')
 
 
 def _report_breaks(found: Verification, topic: str, continuity: Continuity) -> None:

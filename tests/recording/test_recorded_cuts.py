@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer as McapWriter
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import (
@@ -439,3 +441,60 @@ def test_a_file_without_those_before_it_may_have_another_cut_than_that_of_the_st
     assert not read_history(tmp_path / 'run').remarks
     (said,) = read_history(tmp_path / 'run' / 'run_1.mcap').remarks
     assert 'are of 2.002 s before the first sample: whether the cut was changed' in said
+
+
+def test_what_was_said_goes_with_the_samples_where_a_writer_mixed_up_chunks(
+    tmp_path: Path,
+) -> None:
+    record = Record(tmp_path / 'run')
+    lathe = record.start(VirtualLathe(), asked=True)
+    record.cut(lathe, 300)
+    record.change(lathe, depth_of_cut=0.0007)
+    record.cut(lathe, 300)
+    record.flag(up=True)
+    record.cut(lathe, 100)
+    record.writer.close()
+    with (tmp_path / 'run' / 'run_0.mcap').open('rb') as source:
+        reader = make_reader(source)
+        messages = [*reader.iter_messages(log_time_order=False)]
+        notes = [note for note in reader.iter_metadata() if note.name.startswith('lathe_chatter')]
+    file = tmp_path / 'mixed.mcap'
+    with file.open('wb') as stream:
+        writer = McapWriter(stream, chunk_size=50_000)
+        writer.start('ros2', 'another')
+        numbers: dict[int, int] = {}
+        for schema, channel, message in reversed(messages):
+            if channel.id not in numbers:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                numbers[channel.id] = writer.register_channel(channel.topic, 'cdr', number)
+            stamps = message.log_time, message.data, message.publish_time
+            writer.add_message(numbers[channel.id], *stamps)
+        for note in notes:
+            writer.add_metadata(note.name, note.metadata)
+        writer.finish()
+    history = read_history(file)
+    assert [(change.time, change.new) for change in history.changes] == [
+        (0.6, {'depth_of_cut': 0.0007})
+    ]
+    assert [round(flag.time, 3) for flag in history.flags] == [1.2]
+    text, loss, unproven = said(file)
+    assert f'all {700 * TICK} samples were computed again' in text
+    assert (loss, unproven) == (False, False)
+
+
+@pytest.mark.parametrize('noted', [True, False])
+def test_verify_tells_of_a_clock_that_was_set_back_once(noted: bool, tmp_path: Path) -> None:
+    record = Record(tmp_path / 'run')
+    watch = ClockWatch(lambda: record.stamp, lambda: record.now)
+    lathe = record.start(VirtualLathe(), asked=True)
+    record.cut(lathe, 100)
+    watch.look()
+    record.step = -2_000_000_000
+    watch.look()
+    record.cut(lathe, 100)
+    if noted:
+        record.writer.note(CLOCK, watch.values())
+    record.writer.close()
+    told = [each.text for each in verify(tmp_path / 'run').findings if 'clock' in each.text]
+    assert len(told) == 1
+    assert 'the system clock was set back by 2.000 s' in told[0]
