@@ -123,10 +123,9 @@ class SnapshotBuffer:
         messages = [*older, *self._log, *self._messages]
         parameters = {name: self._since(name, told, messages) for name, told in parameters.items()}
         with RunWriter(folder, **options) as writer:
-            for name, values in self._notes.items():
+            told = {PARAMETERS + node: parameter_values(each) for node, each in parameters.items()}
+            for name, values in {**self._notes, **told}.items():
                 writer.note(name, values)
-            for node, answers in parameters.items():
-                writer.note(PARAMETERS + node, parameter_values(answers))
             for file in self._files:
                 writer.attach_file(file)
             for each in messages:

@@ -10,6 +10,7 @@ from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING, change_sentence
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import read_run, verify
+from lathe_chatter.recording.provenance import PARAMETERS, parameter_values
 from lathe_chatter.recording.ros_messages import LOG_TYPE, log_bytes, topic_of_type
 from lathe_chatter.recording.run_summary import SUMMARY
 from lathe_chatter.recording.snapshot import SnapshotBuffer
@@ -42,6 +43,7 @@ class Recorder:
         lathe.retune(lathe.cut.with_changes(**values))
         self.say(BEGINNING)
         self.answers.append((parameters_of(lathe), time.time_ns()))
+        self.kept.note(f'{PARAMETERS}/lathe', parameter_values(self.answers))
         return lathe
 
     def cut(self, lathe: VirtualLathe, seconds: float) -> None:
