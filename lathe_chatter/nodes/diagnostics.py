@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,8 @@ OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
 ERROR, STALE = DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 
 _TOPIC = '/diagnostics'
+_MAX_NODES = 1000
+"""Nodes whose statuses are kept: anybody may make up names."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,8 @@ class DiagnosticsListener:
         """Keep the newest status of each part."""
         for status in message.status:
             node, _, part = status.name.partition(': ')
+            if node not in self.statuses and len(self.statuses) >= _MAX_NODES:
+                continue
             self.spoke(node)
             self.statuses[node] = {**self.statuses.get(node, {}), part: {
                 'level': int.from_bytes(status.level, 'little'),
@@ -113,6 +118,13 @@ class DiagnosticsListener:
     def silence(self, name: str) -> float:
         """How long nothing came from there, s."""
         return time.monotonic() - self._spoke_at.get(name, -math.inf)
+
+    def number(self, node: str, part: str, key: str, otherwise: float = math.nan) -> float:
+        """One of the newest values of a part, where it is a finite number."""
+        with suppress(KeyError, ValueError):
+            found = float(self.values(node, part)[key])
+            return found if math.isfinite(found) else otherwise
+        return otherwise
 
     def values(self, node: str, part: str) -> dict[str, str]:
         """The newest values of a part; empty where there are none."""

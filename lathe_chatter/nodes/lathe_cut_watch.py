@@ -60,8 +60,9 @@ class LatheCutWatch:
         if event.node != self._lathe:
             return
         for entry in (*event.new_parameters, *event.changed_parameters):
-            if entry.name == _DEPTH:
-                before, self._depth = self._depth, float(parameter_value_to_python(entry.value))
+            depth = parameter_value_to_python(entry.value)
+            if entry.name == _DEPTH and isinstance(depth, float):  # anybody may publish events
+                before, self._depth = self._depth, depth
                 if math.isnan(before):
                     self._on_depth(math.nan)
                 if before != self._depth:

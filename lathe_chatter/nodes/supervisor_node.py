@@ -23,7 +23,12 @@ from lathe_chatter.detection.estimate import HEARD
 from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
-from lathe_chatter.model.lathe_parameter_table import cut_from, described_by, machine_from
+from lathe_chatter.model.lathe_parameter_table import (
+    LATHE,
+    cut_from,
+    described_by,
+    machine_from,
+)
 from lathe_chatter.model.machine_file import narrowed
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
@@ -73,7 +78,7 @@ class SupervisorNode(ParameterNode):
         self._state = ''
         self._chatter: bool | None = None  # until the monitor has said
         self._heard_at = self._lost_at = -math.inf
-        self._lost = self._restarts = -1
+        self._lost = self._restarts = -1.0
         self._reports = DiagnosticsListener()
         self._told: dict[str, dict[str, Any]] = {}  # of lathe and monitor
         self._cut_is_new = False  # for the monitor's figures
@@ -177,16 +182,20 @@ class SupervisorNode(ParameterNode):
         if not any(status.name.startswith(f'{self._monitor}: ') for status in message.status):
             return
         self._cut_is_new = False
-        samples = self._reports.values(self._monitor, 'samples')
-        lost = int(samples.get('samples lost', self._lost))
+        number = partial(self._reports.number, self._monitor, 'samples')
+        lost = number('samples lost', self._lost)
         if lost > self._lost >= 0:
             self._lost_at = time.monotonic()
-        restarts = int(samples.get('restarts of the lathe', 0))
+        restarts = number('restarts of the lathe', 0.0)
         if restarts > self._restarts >= 0:  # it may be another machine, and another cut
-            self._cut = None
-            self._told.pop(self._lathe, None)
-            self._remote.want_again(self._lathe)
+            self._ask_again()
         self._lost, self._restarts = lost, restarts
+
+    def _ask_again(self) -> None:
+        """What the lathe is, is not known any more."""
+        self._cut = None
+        self._told.pop(self._lathe, None)
+        self._remote.want_again(self._lathe)
 
     def _on_event(self, event: ParameterEvent) -> None:
         """Follow the lathe; what this node has not set somebody else has."""
@@ -195,10 +204,14 @@ class SupervisorNode(ParameterNode):
             return
         entries = (*event.new_parameters, *event.changed_parameters)
         values = {p.name: parameter_value_to_python(p.value) for p in entries}
-        changed = {n: v for n, v in values.items() if known.get(n) != v}
-        if any(self._sent.get(name) != value for name, value in changed.items()):
-            self._say_of(self._core.hand_moved(time.monotonic()))
-        self._take_changes(changed)
+        try:
+            changed = {n: v for n, v in _checked(values).items() if known.get(n) != v}
+            if any(self._sent.get(name) != value for name, value in changed.items()):
+                self._say_of(self._core.hand_moved(time.monotonic()))
+            self._take_changes(changed)
+        except LatheChatterError as error:  # of somebody else, for the lathe takes no such value
+            self._doubt(self._lathe, error)
+            self._ask_again()
 
     def _take_changes(self, changed: Mapping[str, Any]) -> None:
         """The lathe has changed."""
@@ -208,7 +221,12 @@ class SupervisorNode(ParameterNode):
             self._cut_is_new = True
 
     def _take_parameters(self, name: str, values: dict[str, Any]) -> None:
-        self._told[name] = {n: v for n, v in values.items() if v is not None}
+        known = {n: v for n, v in values.items() if v is not None}
+        try:
+            self._told[name] = _checked(known) if name == self._lathe else known
+        except LatheChatterError as error:
+            self._doubt(name, error)
+            return
         told = self._told.get(self._monitor, {})
         source = told.get('model', ModelSource.NONE.value)
         if source == ModelSource.LATHE.value:
@@ -220,7 +238,10 @@ class SupervisorNode(ParameterNode):
             if told and source != ModelSource.NONE.value:
                 self._machine = machine_from(told)
         except LatheChatterError as error:
-            self.bounded_log.error(f'{name} does not say what it is: {error}', name)
+            self._doubt(name, error)
+
+    def _doubt(self, name: str, error: LatheChatterError) -> None:
+        self.bounded_log.error(f'{name} does not say what it is: {error}', name)
 
     # -- acting --------------------------------------------------------------------------------
 
@@ -231,14 +252,15 @@ class SupervisorNode(ParameterNode):
         heard = self._reports.values(self._monitor, 'cut')
         believed = heard.get('works with') in _BELIEVED
         self._core.machine = self._machine if believed else None
-        stiffness = math.nan if self._cut_is_new else float(heard.get('C w, N/m', math.nan))
+        number = partial(self._reports.number, self._monitor, 'cut')
+        stiffness = math.nan if self._cut_is_new else number('C w, N/m')
         return Seen(
             now,
             cut,
             bool(flag),
             **figures,
             cutting_stiffness=stiffness,
-            tool_frequency=float(heard.get(TOOL_FREQUENCY, math.nan)),
+            tool_frequency=number(TOOL_FREQUENCY),
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             lasted=self._lasted(now),
             hindrance=self._hindrance(now),
@@ -248,7 +270,7 @@ class SupervisorNode(ParameterNode):
     def _lasted(self, now: float) -> float:
         """s that the newest change has been in force: from the tick after the answer at latest."""
         told = self._told[self._lathe]
-        reached = float(self._reports.values(self._lathe, 'pace').get('real-time factor', 1.0))
+        reached = self._reports.number(self._lathe, 'pace', 'real-time factor', 1.0)
         pace = min(reached, float(told.get('real_time_factor') or 1.0), 1.0)
         return pace * (now - self._answered_at) - 1.0 / float(told.get('tick_rate', math.inf))
 
@@ -345,6 +367,15 @@ class SupervisorNode(ParameterNode):
         }
         able = f'nothing can be done: {hindrance}' if hindrance else 'ready'
         return [Status('action', WARN if hindrance else OK, able, values)]
+
+
+def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters of a lathe as it can have them: whoever says so may be none.
+
+    Raises:
+        ParameterError: If it cannot.
+    """
+    return {name: LATHE[name].check(value) for name, value in values.items() if name in LATHE}
 
 
 def _limits_of(values: Mapping[str, Any]) -> Limits:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -20,6 +23,7 @@ from support.node_bench import Bench, messages_of
 from support.node_processes import NodeProcesses, Reports, Samples, contiguous
 
 from lathe_chatter.lathe.change_and_knock_sentences import parse_change
+from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 
 FLOOD = 10_000
 UNKNOWN_TYPE = 200
@@ -128,6 +132,46 @@ def test_floods_of_all_kinds_leave_a_log_that_can_be_read(
     assert len([each for each in said if 'from here on simulated time' in each]) <= 7
     assert len([each for each in said if each.startswith('At time zero again')]) <= 7
     assert len([each for each in said if 'knock of' in each]) <= 1
+
+
+def test_what_others_say_in_the_name_of_a_node_ends_nobody(
+    bench: Bench, nodes: NodeProcesses
+) -> None:
+    samples = Samples(bench)
+    listeners = [
+        nodes.start('chatter_monitor'),
+        nodes.start('chatter_supervisor', 'mode:=act'),
+        nodes.start('run_recorder', f'output:={nodes.folder / "run"}'),
+    ]
+    reports = Reports(bench)
+    nodes.start('lathe')
+    known = '/chatter_supervisor: action'
+    bench.spin_until(
+        lambda: any(status.message == 'ready' for status in reports.statuses(known)), 'readiness'
+    )
+    events = bench.talk(ParameterEvent, '/parameter_events')
+    told = bench.talk(DiagnosticArray, '/diagnostics')
+    keys = ['samples lost', 'restarts of the lathe', 'C w, N/m', TOOL_FREQUENCY, 'works with']
+    parts = ['chatter_monitor: samples', 'chatter_monitor: cut', 'lathe: pace']
+    names = ['depth_of_cut', 'spindle_acceleration', 'tick_rate', 'real_time_factor', 'machine']
+    for wrong in ('x', math.nan, None, [1.0], 0.0, -1e300):
+        event = ParameterEvent(node='/lathe')
+        event.changed_parameters = messages_of(dict.fromkeys(names, wrong))
+        events.publish(event)
+        values = [KeyValue(key=key, value=str(wrong)) for key in [*keys, 'real-time factor']]
+        statuses = [DiagnosticStatus(name=f'/{part}', values=values) for part in parts]
+        told.publish(DiagnosticArray(status=statuses))
+        since = reports.count()
+        for name in ('/chatter_monitor: samples', known, '/run_recorder: recording'):
+            bench.spin_until(
+                lambda name=name, since=since: any(
+                    status.hardware_id  # which what others say here lacks
+                    for status in reports.statuses(name, since)
+                ),
+                f'{name} after {wrong}',
+            )
+    assert [process.poll() for process in listeners] == [None] * len(listeners)
+    assert len(samples) > 10
 
 
 def set_of(depth: float) -> SetParameters.Request:
