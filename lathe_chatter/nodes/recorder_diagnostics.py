@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 from rclpy.node import Node
 
@@ -12,13 +11,15 @@ from lathe_chatter.nodes.log_rate_limit import BoundedLog
 from lathe_chatter.nodes.polled_subscription import publisher_names, several_publish
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.nodes.recorder_topic_selection import TopicWatch
+from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
 from lathe_chatter.recording.recording_statistics import Discontinuity, RunLog, SamplesReceived
+from lathe_chatter.recording.snapshot import SnapshotBuffer
 from lathe_chatter.samples.continuity import BlockOrder
 
 
 def recording_status(
-    run: Path | None,
+    sink: RunWriter | SnapshotBuffer | None,
     failure: str,
     watch: TopicWatch | None,
     log: RunLog,
@@ -27,15 +28,16 @@ def recording_status(
     """The status of a recorder.
 
     Args:
-        run: Its folder; None while nothing is recorded.
+        sink: What takes the messages; None while nothing is recorded.
         failure: Why a recording ended that should not have; empty where none did.
         watch: Over its topics; None before the first run.
         log: Of the run.
         stalls: Of the recorder.
     """
     topics = {} if watch is None else watch.topics
+    run = sink.folder if isinstance(sink, RunWriter) else ''
     values = {
-        'run': str(run or ''),
+        'run': str(run),
         'messages': str(sum(topic.messages for topic in topics.values())),
         'lost': str(sum(topic.lost for topic in topics.values())),
         'topics': str(len(topics)),
@@ -54,7 +56,8 @@ def recording_status(
         return Status('recording', ERROR, failure, values)
     complaints = [*_complaints(topics, log)]
     complaints += [f'nobody publishes {name}' for name in (watch.awaited if watch else ())]
-    said = '; '.join(['recording' if run else 'not recording', *complaints])
+    does = 'not recording' if sink is None else 'keeping the last in memory'
+    said = '; '.join(['recording' if run else does, *complaints])
     mixed = any(received.mixture for received in log.samples.values())
     return Status('recording', ERROR if mixed else WARN if complaints else OK, said, values)
 

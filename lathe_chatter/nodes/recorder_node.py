@@ -379,7 +379,7 @@ class RecorderNode(ParameterNode):
         self._diagnostics.publish([self._status()])
 
     def _status(self) -> Status:
-        return recording_status(self.run, self._failure, self._watch, self._log, self._stalls)
+        return recording_status(self._sink, self._failure, self._watch, self._log, self._stalls)
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import rclpy
 from mcap.reader import make_reader
+from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -68,8 +69,9 @@ def apart(domain: int) -> Iterator[Callable[[str], Node]]:
 
 
 def test_a_type_that_changes_goes_on_as_another_channel(
-    start: Start, apart: Callable[[str], Node], spin_until: Any, tmp_path: Path
+    start: Start, apart: Callable[[str], Node], bench: Bench, spin_until: Any, tmp_path: Path
 ) -> None:
+    log = bench.listen_first(Log, '/rosout')
     recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/x'])
     first = apart('first')
     numbers = first.create_publisher(Float64, '/x', KEPT)
@@ -80,6 +82,8 @@ def test_a_type_that_changes_goes_on_as_another_channel(
     words.publish(String(data='two'))
     spin_until(lambda: recorder._topics['/x'].topic.type.endswith('String'), 'the other type')
     spin_until(lambda: recorder.messages_of('/x') == 1, 'the word')
+    said = '/x is now of type std_msgs/msg/String, and recorded as such.'
+    spin_until(lambda: any(entry.msg == said for entry in log), 'the sentence')
     recorder.stop()
     found = [m.message.data for m in read_run(tmp_path / 'run').messages('/x')]
     assert found == [1.5, 'two']

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 from pathlib import Path
 
@@ -34,6 +36,23 @@ def test_a_semaphore_that_a_killed_process_had_is_removed(tmp_path: Path) -> Non
     (sentence,) = free_ports(tmp_path)
     assert sentence.startswith(f'{semaphore} was left locked by a process')
     assert not semaphore.exists()
+
+
+def test_what_another_user_left_is_named_and_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = tmp_path / 'fastrtps_port7400'
+    port.touch()
+
+    def refuse(_path: Path, **_options: bool) -> None:  # as the system does, but not to root
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(Path, 'unlink', refuse)
+    (sentence,) = free_ports(tmp_path)
+    assert sentence.endswith(
+        'and a node may wait on it for ever; to remove it: Operation not permitted.'
+    )
+    assert port.exists()
 
 
 def test_a_port_that_somebody_is_making_stays(tmp_path: Path) -> None:

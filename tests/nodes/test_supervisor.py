@@ -7,10 +7,11 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import Log
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import parameter_value_to_python
+from rclpy.task import Future
 from std_msgs.msg import Bool, String
 from support.node_bench import LATCHED, Bench
 from support.node_processes import NodeProcesses
@@ -196,3 +197,61 @@ def test_limits_that_do_not_suit_the_machine_are_told_once(
     bench.spin_until(lambda: len(warned()) >= len(wanted), 'that it says so')
     assert bench.set_together(SUPERVISOR, hands_off=1.0).successful  # it begins anew
     assert warned() == sorted(wanted, reverse=True)
+
+
+def test_what_it_says_of_itself_is_so(start: Callable[..., Any], bench: Bench) -> None:
+    node = start(SupervisorNode)
+    states = bench.node.create_publisher(String, '/chatter_monitor/state', LATCHED)
+    reports = bench.talk(DiagnosticArray, '/diagnostics')
+
+    def able() -> tuple[str, str]:
+        (status,) = node._statuses()
+        return status.message, str(status.values['newest sentence'])
+
+    def await_reason(reason: str, state: str, lost: int) -> None:
+        values = [KeyValue(key='samples lost', value=str(lost))]
+        name = '/chatter_monitor: samples'
+
+        def holds() -> bool:
+            states.publish(String(data=state))
+            reports.publish(DiagnosticArray(status=[DiagnosticStatus(name=name, values=values)]))
+            bench.executor.spin_once(timeout_sec=0.05)
+            return able()[0] == f'nothing can be done: {reason}'
+
+        bench.spin_until(holds, reason)
+
+    silent = 'nothing can be done: nothing comes from the monitor'
+    assert able() == (silent, 'nothing was done yet')
+    answer = bench.trigger(f'{SUPERVISOR}/accept')
+    assert (answer.success, answer.message) == (False, 'The lathe is not known yet.')
+    assert bench.set_together(SUPERVISOR, hands_off=1.0).successful
+    assert able() == (silent, 'From now on: hands_off = 1.0.')
+    await_reason('the monitor does not know the state of the cut', 'unknown', 0)
+    await_reason('the lathe cannot be reached', 'stable', 0)
+    await_reason('samples were lost', 'stable', 5)
+    service = bench.node.create_service(
+        SetParametersAtomically,
+        '/lathe/set_parameters_atomically',
+        lambda _request, answer: answer,
+    )
+    await_reason('the machine is not known, or does not fit what is heard', 'stable', 5)
+    bench.node.destroy_service(service)
+
+
+def test_a_lathe_that_is_none_is_told(start: Callable[..., Any], bench: Bench) -> None:
+    log = bench.listen_first(Log, '/rosout', LATCHED)
+    lathe = bench.another('lathe')
+    lathe.declare_parameter('machine', 'no such machine')
+    start(SupervisorNode)
+    said = '/lathe does not say what it is: '
+    bench.spin_until(lambda: any(entry.msg.startswith(said) for entry in log), 'the sentence')
+
+
+def test_a_lathe_that_does_not_answer_is_told(start: Callable[..., Any]) -> None:
+    node = start(SupervisorNode)
+    node._wait(Future())  # of a request that nobody has
+    node._answer = node._answer[0], node._answer[1] - 10.0
+    node._look()
+    (status,) = node._statuses()
+    said = 'Nothing more is done, for the lathe refused: it does not answer.'
+    assert status.values['newest sentence'] == said
