@@ -178,7 +178,7 @@ class CutLog:
             f'The parameters that were noted have {name} {first.noted[name]!r} at the start, and '
             f'the lathe announced {announced!r}.'
             for name, announced in first.announced.items()
-            if _is_of_cut(name) and first.noted.get(name, announced) != announced
+            if _is_of_cut(name) and name in first.noted and first.noted[name] != announced
         ]
         values = found if found.keys() >= _NEEDED else {}
         for session in sessions:

@@ -21,6 +21,7 @@ from lathe_chatter.model import Cut
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.recording import LatheRun, RunWriter, read_run, resimulate, verify
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
+from lathe_chatter.recording.cut_log import CutLog
 from lathe_chatter.recording.provenance import (
     IDENTITY,
     PARAMETERS,
@@ -498,3 +499,10 @@ def test_verify_tells_of_a_clock_that_was_set_back_once(noted: bool, tmp_path: P
     told = [each.text for each in verify(tmp_path / 'run').findings if 'clock' in each.text]
     assert len(told) == 1
     assert 'the system clock was set back by 2.000 s' in told[0]
+
+
+def test_a_parameter_that_is_no_number_and_was_noted_by_nobody_is_no_contradiction() -> None:
+    """Anybody may announce one in the name of a lathe."""
+    log = CutLog()
+    log.assign_parameters([({'depth_of_cut': 1e-3}, 2)], [({'feed_speed': float('nan')}, 1)])
+    assert log.contradictions == []
