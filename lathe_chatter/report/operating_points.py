@@ -167,7 +167,9 @@ def draw_path(axes: Axes, history: History, chart: ChartOf) -> None:
     if any(stay.chatter for stay in here):
         axes.plot([], [], 'o', color='k', mfc=ALARM, label='chatter flagged there')
     place = {'loc': 'upper center', 'bbox_to_anchor': (0.5, -0.17)}
-    axes.legend(**place, ncols=3, fontsize=8, frameon=False)
+    spec = axes.get_subplotspec()
+    alone = spec is None or spec.get_gridspec().ncols == 1
+    axes.legend(**place, ncols=3 if alone else 2, fontsize=8, frameon=False)
     axes.set_title(f'stability chart: {bearing_text(chart.cut)}', fontsize=10, color='k')
 
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from lathe_chatter.cli import main as cli
 from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.model.machine_file import load_machine
+from lathe_chatter.report import run_figure
 from lathe_chatter.report.operating_points import charts_of, draw_path, probabilities_of
 from lathe_chatter.report.probability_chart import SURE, probability_sentence
 from lathe_chatter.report.run_excerpts import excerpts_of
@@ -113,3 +114,22 @@ def test_an_operating_point_at_the_border_is_whole(tmp_path: Path) -> None:
     height = picture.get_width_height()[1]
     row = round(height - axes.transData.transform(point.get_xydata()[0])[1])
     assert np.asarray(picture.buffer_rgba())[row, beyond - 2 : beyond + 1, :3].min() < 128
+
+
+@pytest.mark.filterwarnings('error')
+def test_the_charts_of_many_feeds_are_wide_enough_to_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    feeds = ''.join(f'  - {{at: {0.1 * k}, set: {{feed_speed: 0.00{20 + k}}}}}\n' for k in (1, 2))
+    scenario = tmp_path / 'feeds.yaml'
+    scenario.write_text(f'title: Feeds\nduration: 0.3\nsteps:\n{feeds}', encoding='utf-8')
+    run = tmp_path / 'run'
+    assert cli.main(['simulate', '--scenario', str(scenario), '--output', str(run)]) == 0
+    history = read_history(run)
+    figures: list[Figure] = []
+    monkeypatch.setattr(run_figure, 'save', lambda figure, _path: figures.append(figure))
+    run_figure.draw_run(history, excerpts_of(history), tmp_path / 'report.png')
+    FigureCanvasAgg(figures[0]).draw()
+    charts = [axes for axes in figures[0].axes if axes.get_title().startswith('stability chart')]
+    assert len(charts) == 3
+    assert min(axes.get_position().width for axes in charts) > 0.3
