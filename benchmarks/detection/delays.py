@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,10 +13,14 @@ from scipy.stats import beta, chi2
 from simulator import RATE
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.compiled import compiled
 from lathe_chatter.stability import rightmost_root
 
 DEAD = 1.0
 """s in which one false alarm counts once."""
+_CUSUM_STEP, _LOW_LIMIT, _CALIBRATED = 1e-3, 5.0, 1000.0
+"""s from look to look of the CUSUM that knows everything; the limit at which its false alarms are
+counted, and for how many s, to know which limit has as few as are asked for."""
 
 
 def alarms(score: Array, threshold: float, begin: float) -> Array:
@@ -98,28 +103,87 @@ def limit_formula(before: float, after: float, alarm_rate: float) -> float:
     return float(np.log1p(gained) / (2.0 * after))
 
 
-def informed_cusum(
-    before: float, after: float, alarm_rate: float, rng: np.random.Generator
-) -> float:
-    """Delay of one run of that CUSUM on the complex amplitude itself, s.
+def _taken(case: Case) -> float:
+    """What the vibration that grows takes of an impulse on the tool, m/(N s)."""
+    last, machine = case.plan[-1], MACHINE
+    root = rightmost_root(machine, last.rpm, last.depth, seated=last.seated)
+    stiffness = machine.workpiece_stiffness(seated=last.seated)
 
-    dA = s A dt + dW with E|dW|^2 = 2 dt; it sees A exactly, without noise of a sensor.
+    def bodies(s: complex) -> tuple[complex, complex]:
+        tool = (machine.tool.mass * s + machine.tool.damping) * s + machine.tool.stiffness
+        return tool, (machine.workpiece.mass * s + machine.workpiece.damping) * s + stiffness
+
+    def whole(s: complex) -> complex:
+        tool, workpiece = bodies(s)
+        shift = 1.0 - np.exp(-s * 60.0 / last.rpm)
+        cutting = machine.cutting_stiffness(last.depth)
+        return tool * workpiece + cutting * shift * (tool + workpiece)
+
+    slope = (whole(root + 1e-3) - whole(root - 1e-3)) / 2e-3
+    return float(abs(bodies(root)[1] / slope))
+
+
+@compiled()
+def _cusum(normal: Array, growth: Array, blur: float, step: float, limit: float) -> Array:
+    """Times of alarms, s, of the likelihood ratio of two Kalman filters, by steps.
+
+    dA = s A dt + dW, E|dW|^2 = 2 dt, is seen in noise whose mean over dt has the power blur / dt.
+
+    Args:
+        normal: Random numbers (n, 4).
+        growth: Rate in each step (n,); the first is that of the stable cut, the last the other.
+        blur: As above.
+        step: s.
+        limit: Of the sum.
     """
-    step = 5e-4
-    d0 = (after - before) ** 2 / (2.0 * abs(before))
-    h = np.log(d0 / alarm_rate)
-    root, half = np.sqrt(step), 0.5 * (after**2 - before**2)
-    amplitude = complex(*rng.standard_normal(2)) * np.sqrt(0.5 / abs(before))
-    total, now, kicks = 0.0, -1.0, rng.standard_normal((16000, 2)) * root
-    for kick in kicks:
-        s = after if now >= 0.0 else before
-        change = s * amplitude * step + complex(kick[0], kick[1])
-        gain = (after - before) * (amplitude.conjugate() * change).real
-        total = max(0.0, total + gain - half * abs(amplitude) ** 2 * step)
-        amplitude += change
-        now += step
-        if total > h:
-            if now >= 0.0:
-                return float(now)
-            total = 0.0
-    return np.inf
+    times = np.full(normal.shape[0], np.nan)
+    before, after = growth[0], growth[-1]
+    kick, spread = math.sqrt(step), blur / step
+    root = math.sqrt(0.5 * spread)
+    calm, wild = math.exp(before * step), math.exp(after * step)
+    a = complex(normal[0, 0], normal[0, 1]) * math.sqrt(0.5 / abs(before))
+    low = high = 0j
+    low_power = high_power = 1.0 / abs(before)
+    total, found = 0.0, 0
+    for n in range(normal.shape[0]):
+        a = a * (wild if growth[n] == after else calm)
+        a += kick * complex(normal[n, 0], normal[n, 1])
+        seen = a + root * complex(normal[n, 2], normal[n, 3])
+        if total <= 0.0:  # as if it began now
+            total, high, high_power = 0.0, low, low_power
+        low, low_power = low * calm, low_power * calm**2 + 2.0 * step
+        high, high_power = high * wild, high_power * wild**2 + 2.0 * step
+        of_low, of_high = low_power + spread, high_power + spread
+        total += abs(seen - low) ** 2 / of_low - abs(seen - high) ** 2 / of_high
+        total += math.log(of_low / of_high)
+        low = low + low_power / of_low * (seen - low)
+        low_power = low_power * spread / of_low
+        high = high + high_power / of_high * (seen - high)
+        high_power = high_power * spread / of_high
+        if total > limit:
+            times[found] = (n + 1) * step
+            found, total = found + 1, 0.0
+    return times[:found]
+
+
+def informed_cusum(case: Case, alarm_rate: float, rng: np.random.Generator) -> float:
+    """Delay of one run of a CUSUM that knows both cuts and all noise, s.
+
+    It sees the motion of the tool against the workpiece in the noise of the sensors. Its limit is
+    that of `alarm_rate` in the stable cut, by the alarms that a lower one raises there.
+    """
+    before, after = rates_of(case)
+    # The amplitude of a real signal has twice what the signal has of the force, and four times the
+    # noise, which is that of two sensors.
+    pushed = (2.0 * _taken(case)) ** 2 * case.around.force_noise
+    blur = 8.0 * case.around.sensor_noise**2 / RATE * 2.0 / pushed
+    quiet = rng.standard_normal((round(_CALIBRATED / _CUSUM_STEP), 4))
+    growth = np.full(len(quiet), before)
+    growth[-1] = after
+    seen = len(_cusum(quiet, growth, blur, _CUSUM_STEP, _LOW_LIMIT))
+    limit = _LOW_LIMIT + np.log(max(seen, 1) / _CALIBRATED / alarm_rate)
+    count, settled = round(8.0 / _CUSUM_STEP), round(1.0 / _CUSUM_STEP)
+    growth = np.where(np.arange(count) < settled, before, after)
+    times = _cusum(rng.standard_normal((count, 4)), growth, blur, _CUSUM_STEP, limit) - 1.0
+    late = times[times > 0.0]
+    return float(late[0]) if late.size else np.inf

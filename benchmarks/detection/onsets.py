@@ -76,11 +76,11 @@ def onsets(options: Any) -> list[str]:
             lines[-1] += f' in steps every {scenarios.STEP:g} s; asked: 1 % false alarms a step'
         pairs = [rates_of(traces.case) for traces in shaken]
         formula = np.array([limit_formula(*pair, asked / 3600.0) for pair in pairs])
-        lines.append(_line('  limit, mean delays by the formula', formula, pace, ''))
+        lines.append(_line('  limit without noise of sensors, mean', formula, pace, ''))
         if not stepped:
             rng = np.random.default_rng(0)
-            informed = np.array([informed_cusum(*pair, asked / 3600.0, rng) for pair in pairs])
-            lines.append(_line('  limit, single runs of that CUSUM', informed, pace, ''))
+            informed = np.array([informed_cusum(t.case, asked / 3600.0, rng) for t in shaken])
+            lines.append(_line('  a CUSUM that knows everything', informed, pace, ''))
         curves[noise] = {}
         for name in (DETECTOR, *RIVALS):
             threshold = (
