@@ -30,6 +30,9 @@ from lathe_chatter.detection.structured_arrays import Records
 
 _BLOCK, _FEWEST = 10, 10
 """Hops in a block of the baseline, and the fewest blocks that make one."""
+_EARLIER, _ENOUGH = 6, 10
+"""Newest blocks of the baseline that do not tell how much its energy swings, for what grows swings
+as well, and the fewest that do."""
 _JUMP = 16.0
 """A disturbance: innovation of a resonator over its usual variance."""
 _BEYOND_GROWTH = 1.5
@@ -54,6 +57,11 @@ _STEP, _STEP_PART = 6.0, 0.04
 """Standard errors, and part of the mean, that make a step; the errors come of few hops."""
 _STEP_HOLD = 300
 """Hops until the baseline is that of the new cut."""
+_STEADY_LIMIT, _STEADY_SWING, _USUAL_HOP, _MOST_LIMIT = 2.8, 0.55, 0.01, 3.2
+"""Logarithm of the energy ratio that is an alarm by itself where the energy swings no more than
+that of sensors' noise and hops are so long, s; and the most that is asked otherwise."""
+_BY_SWING, _BY_PACE = 1.5, 0.15
+"""What is added for each unit of more swing, and for e times as many hops a second."""
 SETTLING = 20
 """Hops after which something is known."""
 _EVEN, SLOWEST_FALL = 0.5, 0.02
@@ -156,7 +164,28 @@ def _close_block(state: DetectorState) -> None:
             for row in range(1 + LAG, 1 + LAG + count):
                 total += blocks[row, j]
             state.baseline[j] = max(total / count, state.least[j])
+        now.swing = _swing(blocks, 1 + LAG + _EARLIER, 1 + LAG + count)
         now.usual_speed = state.block_speeds[1 + LAG : 1 + LAG + count].mean()
+
+
+@compiled(borrows=True, inner=True)
+def _swing(blocks: Array, first: int, end: int) -> float:
+    """Spread of the energy of some blocks over its mean, on average over the resonators.
+
+    White noise has 0.5; that of a mode which it drives has more, the less it is damped.
+    """
+    count = end - first
+    if count < _ENOUGH:
+        return np.nan
+    swing = 0.0
+    for j in range(blocks.shape[1]):
+        mean = square = 0.0
+        for row in range(first, end):
+            mean += blocks[row, j] / count
+            square += blocks[row, j] ** 2 / count
+        if mean > 0.0:
+            swing += math.sqrt(max(square - mean**2, 0.0)) / mean / blocks.shape[1]
+    return swing
 
 
 @compiled(borrows=True, inner=True)
@@ -164,6 +193,23 @@ def has_drifted(state: DetectorState) -> bool:
     """Whether the baseline is that of another speed."""
     speed, usual = state.speeds[0], state.now[0].usual_speed
     return bool(abs(speed - usual) > _DRIFT * usual)
+
+
+@compiled(borrows=True, inner=True)
+def is_another_cut(state: DetectorState) -> bool:
+    """Whether the baseline may be that of another cut."""
+    return bool(state.now[0].stepped != 0 or has_drifted(state))
+
+
+@compiled(borrows=True, inner=True)
+def energy_limit(state: DetectorState, period: float) -> float:
+    """Logarithm of the energy ratio that is an alarm by itself, without a machine."""
+    swing = state.now[0].swing
+    if swing != swing or is_another_cut(state):
+        return _MOST_LIMIT
+    limit: float = _STEADY_LIMIT + _BY_SWING * max(swing - _STEADY_SWING, 0.0)
+    limit += _BY_PACE * max(math.log(_USUAL_HOP / period), 0.0)
+    return min(limit, _MOST_LIMIT)
 
 
 @compiled(borrows=True, inner=True)

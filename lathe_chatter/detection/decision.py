@@ -21,6 +21,7 @@ from lathe_chatter.detection.baseline import (
     ARMED,
     SETTLING,
     dies_down,
+    energy_limit,
     follow_breaks,
     follow_energy,
     follow_lines,
@@ -30,6 +31,7 @@ from lathe_chatter.detection.baseline import (
     follow_speed,
     growth_by_energy,
     has_drifted,
+    is_another_cut,
     restart_baseline,
 )
 from lathe_chatter.detection.detector_state import (
@@ -54,10 +56,6 @@ LIMITS = np.array([10.0, 7.2, 6.1, 5.5, 5.1, 4.7])
 """Growth rate over its standard error that is an alarm by itself, in each window."""
 _ENERGY_LIMIT = 2.88
 """Logarithm of the energy ratio, and a share of growth over its error, that make an alarm."""
-_BLURRED = 0.91
-"""Part of that limit where the sensors' noise outweighs the vibration, and is the steadier."""
-_ENERGY_ALONE = 3.2
-"""The same of the energy ratio alone, without a model of the machine."""
 _GROWTH_SHARE = 0.1
 _MOST_GROWTH = 6.0
 SMALLEST_GROWTH = 0.2
@@ -132,13 +130,15 @@ def _trust(windows: Records) -> float:
 @compiled(borrows=True, inner=True)
 def _other_cut(state: DetectorState, trust: float) -> float:
     """By how much more the energy must have risen, for it may be compared with another cut's."""
-    if state.now[0].stepped == 0 and not has_drifted(state):
+    if not is_another_cut(state):
         return 1.0
     return _AFTER_STEP + (_AFTER_CLEAR_STEP - _AFTER_STEP) * trust
 
 
 @compiled(borrows=True, inner=True)
-def _score(state: DetectorState, windows: Records, model: bool, forced: bool) -> float:
+def _score(
+    state: DetectorState, windows: Records, model: bool, forced: bool, enough: float
+) -> float:
     """1 is an alarm."""
     now = state.now[0]
     score, rise = 0.0, now.rise
@@ -156,11 +156,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
         score = rise
         if model and sureness == sureness:
             score += _GROWTH_SHARE * trust * min(sureness, _MOST_GROWTH)
-        if model:
-            score /= _ENERGY_LIMIT * (_BLURRED + (1.0 - _BLURRED) * trust)
-        else:
-            score /= _ENERGY_ALONE
-        score /= _other_cut(state, trust)
+        score /= enough * _other_cut(state, trust)
         first = 0 if model else _SHORTEST_BY_ENERGY
         stable = _surely_stable(windows, first, _TRUSTED + 1)
         if model and has_drifted(state):  # a stable cut is louder at some speeds than at others
@@ -192,9 +188,7 @@ def _score(state: DetectorState, windows: Records, model: bool, forced: bool) ->
 
 
 @compiled(borrows=True, inner=True)
-def _unchecked_score(
-    state: DetectorState, products: Records, windows: Records, full: float, plain: float
-) -> float:
+def _unchecked_score(now: Any, products: Records, full: float, plain: float) -> float:
     """The same while nobody knows whether the machine was told right: more must speak for it.
 
     Told too low it makes every cut unstable, told too high none. So the energy counts as without
@@ -202,28 +196,21 @@ def _unchecked_score(
     noise that F = C w h would not hold with another machine.
 
     Args:
-        state: Before the alarm.
+        now: Of the state, before the alarm.
         products: Sums of the last hops (HOPS,), as a ring.
-        windows: As identified.
         full: The score by the machine.
         plain: The score without.
     """
-    now = state.now[0]
-    if now.holding != 0:
-        both = force = chip = 0.0
-        for back in range(min(max(1, now.holding - 1), _TRANSIENT)):
-            hop = products[(now.newest - back) % HOPS]
-            both += hop.force_chip
-            force += hop.force_force
-            chip += hop.chip_chip
-        coherent = both > 0.0 and both * both > _COHERENT * force * chip
-        return max(full, plain) if coherent else plain
-    trust = _trust(windows)
-    if now.rise == now.rise and trust < 1.0:
-        limit = _ENERGY_LIMIT * _BLURRED * (1.0 - trust) + _ENERGY_ALONE * trust
-        blurred: float = now.rise / limit / _other_cut(state, trust)
-        return max(plain, blurred)
-    return plain
+    if now.holding == 0:
+        return plain
+    both = force = chip = 0.0
+    for back in range(min(max(1, now.holding - 1), _TRANSIENT)):
+        hop = products[(now.newest - back) % HOPS]
+        both += hop.force_chip
+        force += hop.force_force
+        chip += hop.chip_chip
+    coherent = both > 0.0 and both * both > _COHERENT * force * chip
+    return max(full, plain) if coherent else plain
 
 
 @compiled(borrows=True, inner=True)
@@ -364,13 +351,14 @@ def judge(
     forced = (
         now.once_per_turn < _OFF_PHASE and now.synchronous_amplitude > settings.forced_amplitude
     )
-    now.score = _score(state, windows, model, forced) if known else 0.0
+    alone = energy_limit(state, period)
+    limit = _ENERGY_LIMIT if model else alone
+    now.score = _score(state, windows, model, forced, limit) if known else 0.0
     state.plain_scores[newest] = 0.0
     if model and known and (unchecked or now.rise > ARMED):
-        state.plain_scores[newest] = _score(state, plain, not model, forced)
+        state.plain_scores[newest] = _score(state, plain, not model, forced, alone)
     if unchecked and known:
-        alone = state.plain_scores[newest]
-        now.score = _unchecked_score(state, products, windows, now.score, alone)
+        now.score = _unchecked_score(now, products, now.score, state.plain_scores[newest])
     elif model and known and now.rise > ARMED:
         # The machine may be another than was told: what lasts is believed without it.
         lasting = np.inf

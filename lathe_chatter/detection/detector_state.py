@@ -31,7 +31,7 @@ _NOW = record_type(
     """
     usual_misfit misfits_seen peak_amplitude push score rise once_per_turn spread
     synchronous_amplitude smallest_amplitude strictness amplitude shown_amplitude
-    root_cutting root_stiffness usual_speed mean_place mean_power
+    root_cutting root_stiffness usual_speed swing mean_place mean_power
     growth growth_error omega cutting cutting_error stiffness stiffness_error
     """,
     """
