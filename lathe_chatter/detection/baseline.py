@@ -202,13 +202,17 @@ def is_another_cut(state: DetectorState) -> bool:
 
 
 @compiled(borrows=True, inner=True)
-def energy_limit(state: DetectorState, period: float) -> float:
-    """Logarithm of the energy ratio that is an alarm by itself, without a machine."""
+def energy_limit(state: DetectorState, settings: Any) -> float:
+    """Logarithm of the energy ratio that is an alarm by itself.
+
+    Where no machine is told, quick bands hear the swelling of a slow mode, too, which their
+    baselines are too short to know.
+    """
     swing = state.now[0].swing
-    if swing != swing or is_another_cut(state):
+    if settings.has_machine == 0 or swing != swing or is_another_cut(state):
         return _MOST_LIMIT
     limit: float = _STEADY_LIMIT + _BY_SWING * max(swing - _STEADY_SWING, 0.0)
-    limit += _BY_PACE * max(math.log(_USUAL_HOP / period), 0.0)
+    limit += _BY_PACE * max(math.log(_USUAL_HOP / settings.period), 0.0)
     return min(limit, _MOST_LIMIT)
 
 

@@ -83,8 +83,9 @@ _LOUD_LIMITS = (5.0, 3.5)
 _TRANSIENT, _COHERENT = 2, 0.975
 """Newest hops after a disturbance, and the coherence of force and chip in them which no machine
 has that was told wrong by more than some 5 %."""
-_RAISED = 1.5
-"""Logarithm of the energy ratio without which the growth rate alone is no alarm."""
+_RAISED, _DIED_DOWN = 1.5, -3.0
+"""Logarithm of the energy ratio without which the growth rate alone is no alarm, and that below
+which it is none after a disturbance: what is left there are roundings and noise."""
 
 _OFF_PHASE, _ON_PHASE = 0.2, 0.9
 """Once-per-turn variance over all: below the spindle's own vibration, above chatter."""
@@ -168,7 +169,7 @@ def _score(
     free = model or loud or now.since_jump > 12
     # Growth that is read from the energy says nothing new, and noise looks like it now and then.
     first = 0 if model else _PATIENT - 2 * loud
-    if free and not (rise <= _RAISED and now.holding == 0):
+    if free and not rise <= (_RAISED if now.holding == 0 else _DIED_DOWN):
         for number in range(first, windows.shape[0]):
             known = windows[number]
             if not trust >= 0.5:
@@ -351,7 +352,7 @@ def judge(
     forced = (
         now.once_per_turn < _OFF_PHASE and now.synchronous_amplitude > settings.forced_amplitude
     )
-    alone = energy_limit(state, period)
+    alone = energy_limit(state, settings)
     limit = _ENERGY_LIMIT if model else alone
     now.score = _score(state, windows, model, forced, limit) if known else 0.0
     state.plain_scores[newest] = 0.0
