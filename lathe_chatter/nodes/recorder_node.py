@@ -201,7 +201,7 @@ class RecorderNode(ParameterNode):
             if self._log.pauses:
                 writer.note(PAUSES, self._log.pause_values())
             writer.note(RECEPTION, {**self._watch.reception(), **self._stalls.values()})
-            note_end(writer, self._log, self._noted, ended_early, self.get_logger().info)
+            note_end(writer, self._log, self._noted, ended_early, self.bounded_log.info)
             writer.close()
         except (OSError, LatheChatterError) as error:
             said = str(error) if isinstance(error, LatheChatterError) else reason_of(error)
