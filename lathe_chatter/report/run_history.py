@@ -170,7 +170,7 @@ class History:
         for change in self.changes:
             if session.time <= change.time <= time:
                 values |= change.new
-        return session.start.with_changes(**{**values, 'spindle_speed_rpm': self.speed_at(time)})
+        return session.start.with_changes(**{**values, _SPEED: self.speed_at(time)})
 
     def speed_at(self, time: float) -> float:
         """The spindle speed that is reached at a simulated time, rev/min; without its swing."""
@@ -197,7 +197,7 @@ class History:
                 found.append(Ramp(session.time, session.time, speed, begin))
             speed = session.start.spindle_speed_rpm
             for change in self.changes:
-                target = change.new.get('spindle_speed_rpm')
+                target = change.new.get(_SPEED)
                 if target is None or not session.time <= change.time < end:
                     continue
                 if found and found[-1].start <= change.time < found[-1].end:
@@ -244,18 +244,19 @@ class History:
 def _with_steps_joined(events: list[Event]) -> list[Event]:
     joined: list[Event] = []
     for event in events:
-        last = joined[-1] if joined else None
-        if not (isinstance(event, Change) and [*event.new] == [_SPEED]):
-            joined.append(event)
-            continue
-        step = SpeedSteps(event.time, event.time, float(event.new[_SPEED]), 1)
-        if isinstance(last, Change) and [*last.new] == [_SPEED]:
-            last = SpeedSteps(last.time, last.time, float(last.new[_SPEED]), 1)
-        if isinstance(last, SpeedSteps) and 0.0 < event.time - last.time < _CLOSE_UPON:
+        step, last = _speed_steps(event), _speed_steps(joined[-1]) if joined else None
+        if step and last and 0.0 < step.time - last.time < _CLOSE_UPON:
             joined[-1] = step._replace(start=last.start, steps=last.steps + 1)
         else:
             joined.append(event)
     return joined
+
+
+def _speed_steps(event: Event) -> SpeedSteps | None:
+    """A change of the speed alone as one step; None of anything else."""
+    if isinstance(event, Change) and event.new.keys() == {_SPEED}:
+        return SpeedSteps(event.time, event.time, float(event.new[_SPEED]), 1)
+    return event if isinstance(event, SpeedSteps) else None
 
 
 def in_words(event: Event) -> str:
