@@ -134,8 +134,7 @@ class _IndexedReader:
         self._file, self._channel, self._sizes, self._wanted = file, channel, sizes, wanted
         self._buffer = bytearray()  # to be given fresh pages costs more than to read
         self._usual: _Usual | None = None
-        # A size of messages, offsets at which they do not overlap, and the distance of these.
-        self._apart = 0, b'', 0
+        self._apart = 0, b''  # a size of messages, and offsets at which they do not overlap
 
     def blocks(self, received: Spans) -> Iterator[SampleBlocks]:
         """The samples of the channel, as in `as_written`; what is damaged is told."""
@@ -187,18 +186,13 @@ class _IndexedReader:
             return None
         count = size // 16
         offsets = np.frombuffer(index, '<i8')[1::2]
-        if self._apart[:2] != (usual.size, told := offsets.tobytes()):
-            apart = np.diff(offsets)
-            if offsets[0] < 0 or (apart < usual.size).any():
+        if self._apart != (usual.size, offsets.tobytes()):
+            if offsets[0] < 0 or (offsets[1:] - offsets[:-1] < usual.size).any():
                 return None
-            even = count > 1 and apart.min() == apart.max()
-            self._apart = usual.size, told, int(apart[0]) if even else 0
+            self._apart = usual.size, offsets.tobytes()
         if offsets[-1] > len(chunk.records) - usual.size:
             return None
-        memory: bytes | NDArray[np.uint8] = chunk.records
-        first, stride = int(offsets[0]), self._apart[2]
-        if not stride:
-            memory, first, stride = evenly_spaced(chunk.records, offsets, usual.size)
+        memory, first, stride = evenly_spaced(chunk.records, offsets, usual.size)
         heads: NDArray[Any] = np.ndarray((count,), usual.dtype, memory, first, (stride,))
         if heads['fixed'].tobytes() != usual.fixed * count:
             return None
