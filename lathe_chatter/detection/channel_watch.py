@@ -1,4 +1,4 @@
-"""Which channels can be believed: those that give numbers, move, and meet no rail.
+"""Which channels can be believed: those that give numbers, move, and meet no limit of their range.
 
 A signal that moved by many of its own smallest steps from sample to sample and then repeats one
 value for 20 ms stands still: no vibration dies out like that, however coarse the sensor is. One
@@ -16,7 +16,7 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.structured_arrays import Records, record_type
 
 _CHANNEL = record_type(
-    'value pace slow_pace smallest_step entry_step run_since high low bad_at rail_at',
+    'value pace slow_pace smallest_step entry_step run_since high low bad_at limit_at',
     'run high_hits low_hits stood_still',
 )
 _AFTERWARDS = 0.5
@@ -29,13 +29,13 @@ _ROUNDING = 1e-10
 """Steps this small against the value itself are none: a cut without noise comes to rest."""
 _PACES = 32.0
 """Samples over which the pace of a signal is followed; the slow one over 32 times as many."""
-_RAIL, _RAIL_RUN, _RAIL_HITS, _RAIL_STEPS = 1.0, 3, 4, 4.0
-"""s between meetings of a rail, samples spent at it, meetings, smallest steps it is met with."""
-_NO_NUMBER, _STANDS_STILL, _AT_RAIL = 1, 2, 3
+_LIMIT, _LIMIT_RUN, _LIMIT_HITS, _LIMIT_STEPS = 1.0, 3, 4, 4.0
+"""s between meetings of a limit, samples spent at it, meetings, smallest steps it is met with."""
+_NO_NUMBER, _STANDS_STILL, _AT_LIMIT = 1, 2, 3
 CAUSES = {
     _NO_NUMBER: 'is not a number',
     _STANDS_STILL: 'stands still',
-    _AT_RAIL: 'is cut off at a limit of its range',
+    _AT_LIMIT: 'is cut off at a limit of its range',
 }
 """What can be wrong with a channel, in words, by number; 0 is nothing."""
 _BITS = max(CAUSES).bit_length()
@@ -49,7 +49,7 @@ def new_channels() -> Records:
     channels['value'] = np.nan
     channels['smallest_step'] = np.inf
     channels['high'], channels['low'] = -np.inf, np.inf
-    channels['bad_at'] = channels['rail_at'] = _NEVER
+    channels['bad_at'] = channels['limit_at'] = _NEVER
     return channels
 
 
@@ -68,18 +68,18 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @compiled(borrows=True, inner=True)
-def _meets_rail(channel: Any, value: float) -> bool:
-    """Whether a value that has come some times in a row is a rail met once more."""
+def _meets_limit(channel: Any, value: float) -> bool:
+    """Whether a value that has come some times in a row is a limit of the range met once more."""
     rounding = _ROUNDING * max(abs(channel.high), abs(channel.low))
-    fast = channel.entry_step >= _RAIL_STEPS * max(channel.smallest_step, rounding)
+    fast = channel.entry_step >= _LIMIT_STEPS * max(channel.smallest_step, rounding)
     if value >= channel.high:
         channel.high_hits = channel.high_hits + 1 if value == channel.high and fast else int(fast)
         channel.high = value
-        return bool(channel.high_hits >= _RAIL_HITS)
+        return bool(channel.high_hits >= _LIMIT_HITS)
     if value <= channel.low:
         channel.low_hits = channel.low_hits + 1 if value == channel.low and fast else int(fast)
         channel.low = value
-        return bool(channel.low_hits >= _RAIL_HITS)
+        return bool(channel.low_hits >= _LIMIT_HITS)
     return False
 
 
@@ -92,8 +92,8 @@ def _causes(channels: Records, time: float) -> int:
         if time - channel.bad_at < _AFTERWARDS:
             cause = _STANDS_STILL if channel.stood_still != 0 else _NO_NUMBER
             causes += cause << _BITS * number
-        elif time - channel.rail_at < _RAIL:
-            causes += _AT_RAIL << _BITS * number
+        elif time - channel.limit_at < _LIMIT:
+            causes += _AT_LIMIT << _BITS * number
     return causes
 
 
@@ -122,8 +122,8 @@ def watch_channels(rows: Array, channels: Records) -> int:
             step = abs(value - channel.value)
             if step == 0.0:
                 channel.run += 1
-                if channel.run == _RAIL_RUN and number > 0 and _meets_rail(channel, value):
-                    channel.rail_at = time
+                if channel.run == _LIMIT_RUN and number > 0 and _meets_limit(channel, value):
+                    channel.limit_at = time
                 long = time - channel.run_since > _STILL and channel.run > _STILL_SAMPLES
                 if number > 0:
                     least = max(channel.smallest_step, _ROUNDING * abs(value))
