@@ -164,8 +164,7 @@ def _cut(  # noqa: PLR0913, PLR0917 -- one loop over plain numbers
         left = xt - xw + fed
         surface[n + 2] = met if may_leave and left < met else left
         out[n, 0], out[n, 1] = (n + 1) / rate, angle
-        out[n, 2], out[n, 3], out[n, 4] = xt, xw, force
-        out[n, 5], out[n, 6], out[n, 7] = vt, vw, pull
+        out[n, 2], out[n, 3], out[n, 4], out[n, 5] = xt, xw, vt, vw
 
 
 def simulate(
@@ -204,10 +203,9 @@ def simulate(
     impulse = math.sqrt(around.force_noise / rate)
     back = -impulse / machine.workpiece.mass if around.at_the_cut else 0.0
     forces = np.array([(1.0, around.unbalance), *around.harmonic_force])
-    out = np.empty((len(steps), 8))
+    out = np.empty((len(steps), 6))
     numbers = np.array([around.chip, impulse / machine.tool.mass, back, rate])
     _cut(tool, workpiece, steps, numbers, forces, rng.standard_normal(len(steps)), out)
-    motion = out[:, 2:].copy()
     turn = 2.0 * math.pi * out[:, 1]
     for number, amplitude in enumerate(around.runout, 1):
         out[:, 3] += amplitude * np.cos(number * turn + number)
@@ -218,5 +216,5 @@ def simulate(
         return out[:, :4].copy()
     # The mean over a sample, as of an accelerometer whose filter lets no faster vibration through;
     # what the random force does is in it.
-    heard = np.diff(motion[:, [3, 4]], axis=0, prepend=0.0) * rate
+    heard = np.diff(out[:, 4:], axis=0, prepend=0.0) * rate
     return np.column_stack([out[:, :4], heard])
