@@ -15,6 +15,7 @@ import os
 import pickle
 import platform
 import signal
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -36,6 +37,8 @@ _PER_WORKER, _PER_WORKER_HERE = 8, 32
 """Batches in all for each worker: fewer where each costs its way to another machine, more where
 workers that are done would wait for the last."""
 RETRIES = 3
+_NOT_FROM_HERE = 'import sys; sys.path[:1] == [""] and sys.path.pop(0)'
+_MODULE = 'import runpy; runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)'
 
 
 class Done(NamedTuple):
@@ -44,6 +47,20 @@ class Done(NamedTuple):
     place: int
     results: list[Any]
     processor: str
+
+
+def python_command(program: str, *arguments: str) -> list[str]:
+    """A command that runs a program in another process of this Python.
+
+    Where the user is may lie a folder `lathe_chatter`, as beside a clone, or a script of any name:
+    unlike `python -m`, it imports nothing from there.
+    """
+    return [sys.executable, '-c', f'{_NOT_FROM_HERE}\n{program}', *arguments]
+
+
+def module_command(module: str, *arguments: str) -> list[str]:
+    """The same of a module, as `python -m` runs it."""
+    return python_command(_MODULE, module, *arguments)
 
 
 def spread(

@@ -17,6 +17,7 @@ import numpy as np
 from lathe_chatter.compiled import before_compiling
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.detection.cut_identification import cutting_limit, mechanics_of
+from lathe_chatter.executors import module_command
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import BearingContact, Cut, Machine
 from lathe_chatter.samples import SAMPLE_COLUMNS
@@ -44,10 +45,11 @@ def precompile(*parts: str, say: Callable[[str], object] = lambda _sentence: Non
     def begin() -> None:
         """Is called when the first part turns out not to be there."""
         say(_SENTENCE)
-        command = [sys.executable, '-m', 'lathe_chatter.precompile']
         helpers.extend(
             subprocess.Popen(  # noqa: S603 -- this very module
-                [*command, part], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                module_command('lathe_chatter.precompile', part),
+                stdin=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
             )
             for part in wanted[1:]
         )

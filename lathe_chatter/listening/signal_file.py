@@ -6,7 +6,6 @@ import csv
 import math
 import re
 import subprocess
-import sys
 import tempfile
 import warnings
 from collections.abc import Sequence
@@ -25,6 +24,7 @@ from lathe_chatter.errors import (
     optional,
     reason_of,
 )
+from lathe_chatter.executors import python_command
 from lathe_chatter.model.values_with_units import number_in, units_of
 from lathe_chatter.recording import read_run
 from lathe_chatter.samples.columns import UNITS
@@ -208,7 +208,7 @@ def _mat(path: Path) -> Read:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / 'numbers.npz'
         done = subprocess.run(  # noqa: S603 -- ourselves
-            [sys.executable, '-c', _MAT_TO_NPZ, path, copy],
+            python_command(_MAT_TO_NPZ, str(path), str(copy)),
             capture_output=True, text=True, check=False,
         )  # fmt: skip
         if done.returncode:

@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager
 from typing import IO, NamedTuple
 
 from lathe_chatter.errors import NodeFailedError
+from lathe_chatter.executors import module_command
 
 _END_TIMEOUT = 15.0
 """s that a node has to finish what it does after SIGTERM."""
@@ -46,7 +47,7 @@ class ProcessGroup(AbstractContextManager['ProcessGroup']):
 
     def start(self, name: str, arguments: Sequence[str] = (), *, module: str = _NODES) -> None:
         """Start a node as `python -m module name` with ROS arguments."""
-        command = [sys.executable, '-m', module, name]
+        command = module_command(module, name)
         if arguments:
             command += ['--ros-args', *arguments]
         output = tempfile.TemporaryFile()  # noqa: SIM115 -- lives as long as the process

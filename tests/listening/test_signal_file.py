@@ -83,6 +83,16 @@ def test_damage_is_read_or_refused_in_a_sentence(
     assert not any('\n' in each for each in said)
 
 
+def test_a_mat_file_is_read_beside_scripts_of_any_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / 'scipy').mkdir()
+    (tmp_path / 'scipy/__init__.py').write_text('raise SystemExit("a script of mine")')
+    write_mat(tmp_path / 'a.mat')
+    monkeypatch.chdir(tmp_path)
+    assert read_signals(Path('a.mat')).rate == pytest.approx(RATE)
+
+
 def test_a_mat_file_that_ends_the_process_of_its_reader_is_a_sentence(tmp_path: Path) -> None:
     write_mat(file := tmp_path / 'damaged.mat')
     data = bytearray(file.read_bytes())

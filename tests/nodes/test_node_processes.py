@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import lathe_chatter
 from lathe_chatter.errors import NodeFailedError
 from lathe_chatter.nodes import node_processes
 from lathe_chatter.nodes.node_processes import ProcessGroup
@@ -31,6 +32,21 @@ def failure(group: ProcessGroup) -> str:
             return str(error)
         time.sleep(0.01)
     return ''
+
+
+def test_nothing_is_imported_from_where_the_user_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside a clone there is a folder of its name, and a script may have any."""
+    here = tmp_path / 'here'
+    (here / 'lathe_chatter').mkdir(parents=True)
+    (here / 'random').mkdir()
+    (here / 'random/__init__.py').write_text('raise SystemExit("a script of mine")')
+    monkeypatch.chdir(here)
+    program = 'import random, lathe_chatter; raise SystemExit(lathe_chatter.__file__)'
+    with ProcessGroup() as group:
+        group.start('node', module=module(tmp_path, monkeypatch, program))
+        assert failure(group) == f'node ended with exit code 1: {lathe_chatter.__file__}'
 
 
 @pytest.mark.parametrize(
