@@ -16,7 +16,8 @@ from lathe_chatter.compiled import compiled
 from lathe_chatter.detection.structured_arrays import Records, record_type
 
 _CHANNEL = record_type(
-    'value pace slow_pace smallest_step entry_step run_since high low bad_at limit_at',
+    'value pace slow_pace smallest_step entry_step run_since high low bad_at limit_at '
+    'angle direction furthest offset',
     'run high_hits low_hits stood_still',
 )
 _AFTERWARDS = 0.5
@@ -31,6 +32,8 @@ _PACES = 32.0
 """Samples over which the pace of a signal is followed; the slow one over 32 times as many."""
 _LIMIT, _LIMIT_RUN, _LIMIT_HITS, _LIMIT_STEPS = 1.0, 3, 4, 4.0
 """s between meetings of a limit, samples spent at it, meetings, smallest steps it is met with."""
+_BACK, _LEAP = 0.5, 0.25
+"""Turns back after which a spindle turns the other way, and turns in a sample that none makes."""
 _NO_NUMBER, _STANDS_STILL, _AT_LIMIT = 1, 2, 3
 CAUSES = {
     _NO_NUMBER: 'is not a number',
@@ -47,6 +50,8 @@ def new_channels() -> Records:
     """Nothing seen of spindle angle, tool and workpiece displacement (3,)."""
     channels = np.zeros(3, _CHANNEL)
     channels['value'] = np.nan
+    channels['angle'] = np.nan
+    channels['direction'] = 1.0
     channels['smallest_step'] = np.inf
     channels['high'], channels['low'] = -np.inf, np.inf
     channels['bad_at'] = channels['limit_at'] = _NEVER
@@ -70,8 +75,8 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
 @compiled(borrows=True, inner=True)
 def _meets_limit(channel: Any, value: float) -> bool:
     """Whether a value that has come some times in a row is a limit of the range met once more."""
-    rounding = _ROUNDING * max(abs(channel.high), abs(channel.low))
-    fast = channel.entry_step >= _LIMIT_STEPS * max(channel.smallest_step, rounding)
+    smallest = max(channel.smallest_step, _ROUNDING * abs(value))
+    fast = channel.entry_step >= _LIMIT_STEPS * smallest
     if value >= channel.high:
         channel.high_hits = channel.high_hits + 1 if value == channel.high and fast else int(fast)
         channel.high = value
@@ -81,6 +86,22 @@ def _meets_limit(channel: Any, value: float) -> bool:
         channel.low = value
         return bool(channel.low_hits >= _LIMIT_HITS)
     return False
+
+
+@compiled(borrows=True, inner=True)
+def _turned(channel: Any, angle: float) -> float:
+    """The spindle angle as it rises, whichever way the spindle turns or its sensor counts."""
+    if not abs(angle - channel.angle) < _LEAP:
+        channel.furthest = angle
+    ahead = channel.direction * (angle - channel.furthest)
+    if ahead < -_BACK:
+        channel.offset += 2.0 * channel.direction * angle
+        channel.direction = -channel.direction
+    if ahead > 0.0 or ahead < -_BACK:
+        channel.furthest = angle
+    channel.angle = angle
+    turned: float = channel.direction * angle + channel.offset
+    return turned
 
 
 @compiled(borrows=True, inner=True)
@@ -99,7 +120,7 @@ def _causes(channels: Records, time: float) -> int:
 
 @compiled()
 def watch_channels(rows: Array, channels: Records) -> int:
-    """Follow the channels; what stands still is made no number.
+    """Follow the channels; what stands still is made no number, and the angle made to rise.
 
     Args:
         rows: Time, spindle angle, tool and workpiece displacement, and, written: the sum of
@@ -112,6 +133,7 @@ def watch_channels(rows: Array, channels: Records) -> int:
     """
     for i in range(rows.shape[0]):
         time, well = rows[i, 0], 0.0
+        rows[i, 1] = _turned(channels[0], rows[i, 1])
         for number in range(3):
             channel = channels[number]
             value = rows[i, number + 1]

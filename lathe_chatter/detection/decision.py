@@ -17,6 +17,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.compiled import compiled
+from lathe_chatter.detection.alarm import RECENT, follow_alarm
 from lathe_chatter.detection.baseline import (
     ARMED,
     SETTLING,
@@ -32,7 +33,6 @@ from lathe_chatter.detection.baseline import (
     growth_by_energy,
     has_drifted,
     is_another_cut,
-    restart_baseline,
 )
 from lathe_chatter.detection.detector_state import (
     HOPS,
@@ -95,11 +95,7 @@ the tool leaves the cut."""
 _STEADY, _SHORT, _STEADIER = 0.12, 32, 0.1
 """Spread of the energy over its mean, over all hops that are remembered and over so many, that is
 steady: noise in a mode has several times as much."""
-SATURATED = 20
-_CALM, _PERSISTENT = 20, 20
-_QUIET, _RECENT, _LASTING = 0.12, 3, 32
-"""Part of its peak at which chatter is over, if it is not back at the baseline before; the window
-in which it must be so; hops that a peak must last."""
+_PERSISTENT = 20
 
 
 @compiled(borrows=True, inner=True)
@@ -251,39 +247,6 @@ def _saturated(
 
 
 @compiled(borrows=True, inner=True)
-def _decide(
-    state: DetectorState, strongest_amplitude: float, recent_amplitude: float, by_itself: bool
-) -> None:
-    """Raise the alarm, or clear it."""
-    now = state.now[0]
-    alarm = now.score >= now.strictness or now.saturated >= SATURATED
-    # What is left of a cut that has settled are roundings, and these repeat themselves.
-    alarm = alarm and strongest_amplitude > now.smallest_amplitude
-    now.suspected = now.suspected + 1 if alarm else 0
-    if now.alarmed == 0:
-        if now.suspected >= 1:
-            now.alarmed, now.since_alarm, now.calm = 1, 0, 0
-            now.peak_amplitude = strongest_amplitude
-            if by_itself and now.score < now.strictness:
-                restart_baseline(state)  # it holds the chatter already
-        return
-    now.since_alarm += 1
-    # A knock is no peak: it has died out within some hops.
-    lasting = np.inf
-    for back in range(_LASTING):
-        lasting = min(lasting, state.amplitudes[(now.newest - back) % HOPS])
-    now.peak_amplitude = max(now.peak_amplitude, lasting)
-    # Where the alarm came at the level of the noise there is no way down but to the baseline.
-    down = recent_amplitude < _QUIET * now.peak_amplitude
-    down = down or (now.rise < ARMED and now.by_line == 0)
-    now.calm = now.calm + 1 if down else 0
-    if now.calm >= _CALM:
-        now.alarmed = now.saturated = now.by_line = 0
-        now.since_break = 0
-        restart_baseline(state)
-
-
-@compiled(borrows=True, inner=True)
 def judge(
     state: DetectorState, settings: Any, products: Records, identified: Records, plain: Records,
     phases: Array, poles: Complex, centres: Array, speed: float,
@@ -342,7 +305,7 @@ def judge(
         comb = max(2.0 * abs(math.sin(0.5 * omega / speed)), 0.1)
     by_power = 2.0 / comb / settings.gain
     amplitude = by_power * math.sqrt(max(windows[1].tool_power, 0.0))
-    recent = by_power * math.sqrt(max(windows[_RECENT].tool_power, 0.0))
+    recent = by_power * math.sqrt(max(windows[RECENT].tool_power, 0.0))
     state.amplitudes[newest] = amplitude
     follow_push(state, products, newest)
     if model:
@@ -381,7 +344,7 @@ def judge(
         sure = sure and _surely_stable(identified, _TRUSTED, WINDOWS.size)
         steady = steady and not dies_down(state, newest, length, settings, sure)
         now.saturated = now.saturated + 1 if steady else 0
-    _decide(state, amplitude, recent, by_itself)
+    follow_alarm(state, amplitude, recent, by_itself)
     write_figures(state, windows, wave, model, amplitude)
     weigh_vibration(now, products[newest], settings)
     now.shown_amplitude = shown_amplitude(now, products, settings, omega, speed)

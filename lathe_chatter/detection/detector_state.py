@@ -29,13 +29,13 @@ SERIOUSNESS = (1, 2, 4, 5, 3, 0)
 
 _NOW = record_type(
     """
-    usual_misfit misfits_seen peak_amplitude push score rise once_per_turn spread
+    usual_misfit misfits_seen peak_amplitude peak_motion push score rise once_per_turn spread
     synchronous_amplitude smallest_amplitude strictness amplitude shown_amplitude
     root_cutting root_stiffness usual_speed swing mean_place mean_power
     growth growth_error omega cutting cutting_error stiffness stiffness_error
     """,
     """
-    newest hops_seen state alarmed since_alarm suspected calm ramping holding since_jump blocks
+    newest hops_seen state alarmed since_alarm calm ramping holding since_jump blocks
     block_fill saturated stepped hold_ended
     fit_hops fit_is_due by_line line_gone strongest since_break out_of_proportion
     """,
@@ -63,6 +63,7 @@ class DetectorState(NamedTuple):
         speeds: Of the last hops, rev/s (SPEEDS,).
         block_speeds: At the ends of the blocks of the baseline, rev/s (blocks,).
         amplitudes: Of the tool in the last hops, as a ring, m (HOPS,).
+        loudest: The strongest resonator in the last hops, as a ring (HOPS,).
         line: Mean of the power of each resonator, and of its square (2, bins).
         line_shares: Of the newest power in these means (bins,).
         plain_scores: What would be suspected without a machine, as a ring (HOPS,).
@@ -77,6 +78,7 @@ class DetectorState(NamedTuple):
     speeds: Array
     block_speeds: Array
     amplitudes: Array
+    loudest: Array
     line: Array
     line_shares: Array
     plain_scores: Array
@@ -104,6 +106,7 @@ def new_state(least: Array, **values: object) -> DetectorState:
         least,
         np.zeros(SPEEDS),
         np.zeros(BLOCK_COUNT + LAG + 1),
+        np.zeros(HOPS),
         np.zeros(HOPS),
         np.zeros((2, bins)),
         np.ones(bins),

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.detection.alarm import SATURATED
 from lathe_chatter.detection.baseline import SETTLING
 from lathe_chatter.detection.cut_identification import FIT, NOISE_SUMS, cutting_limit, mechanics_of
-from lathe_chatter.detection.decision import SATURATED
 from lathe_chatter.detection.detector_state import (
     CHATTER,
     HOPS,
@@ -149,6 +149,7 @@ class BandDetector:
             since_alarm=alarm_age or 0,
             saturated=0 if alarm_age is None else SATURATED,  # it may have grown long ago
             peak_amplitude=0.0,
+            peak_motion=0.0,
         )
         self._now = self.state.now[0]
         self.fit = MachineFit(machine or _PAPER)
@@ -200,6 +201,7 @@ class BandDetector:
         if not now.alarmed:
             now.alarmed, now.since_alarm, now.calm, now.state = 1, 0, 0, CHATTER
             now.peak_amplitude = now.amplitude
+            now.peak_motion = self.state.loudest[now.newest]
 
     def end_alarm(self) -> None:
         """There is nothing any more that would be chatter."""

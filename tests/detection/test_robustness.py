@@ -459,11 +459,61 @@ def test_a_sensor_that_dies_amid_chatter_ends_no_alarm(fault: str, column: str) 
     assert after[-1].mode == before.mode
 
 
-def test_a_sensor_that_is_cut_off_is_named() -> None:
-    samples = _clipped(_chatter(5.0))
+_NEARLY_DEAD: dict[str, Callable[[Array], Array]] = {
+    'its amplifier': lambda signal: np.random.default_rng(1).normal(signal[0], 1e-7, len(signal)),
+    'a thousandth': lambda signal: signal[0] + 1e-3 * (signal - signal[0]),
+    'a toggling bit': lambda signal: signal[0] + 1e-9 * (np.arange(10_000) % 2),
+}
+
+
+@pytest.mark.parametrize('machine', [Machine(), None], ids=['told', 'not told'])
+@pytest.mark.parametrize('column', [_TOOL, _WORKPIECE])
+@pytest.mark.parametrize('left', _NEARLY_DEAD.values(), ids=_NEARLY_DEAD)
+def test_a_sensor_that_has_almost_died_ends_no_alarm(
+    left: Callable[[Array], Array], column: int, machine: Machine | None
+) -> None:
+    """Tool and workpiece still move against each other."""
+    samples = _chatter(5.0)
+    samples[30_000:40_000, column] = left(samples[30_000:40_000, column])
+    detector = ChatterDetector(machine)
+    assert _watch(detector, samples[:30_000])[-1].chatter
+    assert all(estimate.chatter for estimate in _watch(detector, samples[30_000:]))
+
+
+@pytest.mark.parametrize('limits', [(-1e-5, 1e-5), (-1e-5, np.inf), (-np.inf, 1e-5)])
+def test_a_sensor_that_is_cut_off_is_named(limits: tuple[float, float]) -> None:
+    samples = _chatter(5.0)
+    tool = samples[:, _TOOL]
+    samples[:, _TOOL] = np.clip(tool, *(np.median(tool) + limit for limit in limits))
     last = _watch(ChatterDetector(), samples)[-1]
     assert last.chatter
     assert f'{SAMPLE_COLUMNS[_TOOL]} is cut off at a limit of its range' in last.faults
+
+
+@pytest.mark.parametrize('machine', [Machine(), None], ids=['told', 'not told'])
+def test_a_spindle_that_turns_backwards_is_one_that_turns(machine: Machine | None) -> None:
+    """Or whose encoder counts down; nobody tells which way it will be."""
+    forwards, backwards = ChatterDetector(machine), ChatterDetector(machine)
+    samples = _chatter(3.0)
+    expected = _watch(forwards, samples)[-1]
+    samples[:, SAMPLE_COLUMNS.index('spindle_angle')] *= -1.0
+    seen = _watch(backwards, samples)
+    assert seen[-1].chatter
+    assert seen[-1].spindle_speed_rpm == pytest.approx(3000.0, rel=1e-3)
+    assert seen[-1].frequency == pytest.approx(expected.frequency, rel=1e-3)
+    assert 'idle' not in {estimate.state for estimate in seen[20:]}
+
+
+def test_after_it_was_stopped_and_reversed_the_spindle_turns_again() -> None:
+    stable, angle = _seconds(VirtualLathe(cut=_cut()), 3.0), SAMPLE_COLUMNS.index('spindle_angle')
+    stands, back = stable[:10_000].copy(), stable.copy()
+    stands[:, angle] = stable[-1, angle]
+    back[:, angle] = stands[-1, angle] - back[:, angle]
+    samples = np.concatenate([stable, stands, back])
+    samples[:, 0] = np.arange(len(samples)) / 10_000.0
+    seen = _watch(ChatterDetector(), samples)
+    assert not _flagged(seen)
+    assert seen[-1].state == 'stable'
 
 
 def test_an_alarm_ends_within_a_second_of_a_long_cut_and_the_state_is_idle() -> None:
