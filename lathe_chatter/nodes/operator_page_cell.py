@@ -39,6 +39,8 @@ _SILENCE = 2.5
 """s without a word from a node, which speaks once a second, after which it is called silent."""
 _STALE = 1.0
 """Simulated s after which a figure that does not come again is not known any more."""
+_ON = 'not tripped'
+"""What a lathe says of its guard as long as that has not ended the cut."""
 _CLOSEUP_PERIOD, _LOOK_PERIOD = 0.25, 0.5
 _SHOWN_SENTENCES = 80
 _WAITS = {
@@ -68,7 +70,7 @@ class OperatedCell:
         self.playing: Scenario | None = None
         self._player: ScenarioPlayer | None = None
         self._before: dict[str, Any] | None = None
-        self._changed_by_hand = False
+        self._changed_by_hand = self._resetting = False
         self._heard, self._names = heard, self.clients.names
         self._samples_name = f'{lathe}/samples'
         self._decoder = SampleDecoder()
@@ -151,9 +153,13 @@ class OperatedCell:
 
     def _add(self, blocks: list[Any], columns: tuple[str, ...]) -> None:
         for batch in join_blocks(blocks, columns):
+            had_begun = math.isfinite(self._signals.time)
             if self._signals.add(batch.samples, batch.columns):
                 self._figures.clear()
-                self.clients.values.pop('lathe', None)  # it may be another one
+                if had_begun:
+                    self._end_scenario('is stopped, for the lathe has begun anew')
+                if had_begun and not self._resetting:
+                    self.clients.values.pop('lathe', None)  # it may be another one
 
     def _on_flag(self, message: Bool) -> None:
         """The lamp; since when it is lit or out, the monitor's diagnostics say."""
@@ -258,11 +264,11 @@ class OperatedCell:
             case 'back':
                 said = await self._go_back()
             case 'knock':
-                if self._pace() == 'ended':
+                if self._heard.values(self._names['lathe'], 'cut').get('guard', _ON) != _ON:
                     raise LatheChatterError('The cut has ended: nothing was hit.')
                 # One that was killed is on its topic for long still, and nothing answers for it.
                 self.clients.knock(wish['impulse'], there=self._is_alive('lathe'))
-                said = f'Knocked with {wish["impulse"] * 1e3:g} mN s.'
+                said = f'A knock of {wish["impulse"] * 1e3:g} mN s was sent.'
             case 'play':
                 said = await self._begin(load_scenario(find_scenario(str(wish['scenario']))))
             case 'stop_playing':
@@ -275,19 +281,28 @@ class OperatedCell:
         """Call a service, and see to what of it nobody else tells."""
         if service == 'accept':
             self.board.put('asked', value=False)  # whatever comes of it
-        if service == 'reset':
-            self._end_scenario('is stopped by the reset')
-        said = await self.clients.call(service)
-        if service == 'reset' and self._pace() == 'paused':  # no sample tells it
-            self._signals.empty()
-            self._figures.clear()
+        return await (self._reset() if service == 'reset' else self.clients.call(service))
+
+    async def _reset(self) -> str:
+        """Have the same lathe begin anew."""
+        self._resetting = True
+        try:
+            said = await self.clients.call('reset')
+        finally:
+            self._resetting = False
+        self._end_scenario('is stopped, for the lathe has begun anew')
+        # What has come so far may be of the cut before, and a pause sends no more.
+        for _ in self._samples.take():
+            pass
+        self._signals.empty()
+        self._figures.clear()
         return said
 
     async def _begin(self, scenario: Scenario) -> str:
         """Begin a scenario: with its parameters, at time zero."""
         values = self.clients.values.get('lathe')
         if values is None:
-            raise LatheChatterError(f'{self._names["lathe"]} has not told its parameters yet.')
+            raise self.clients.unknown('lathe')
         wanted = LATHE.complete(scenario.parameters)
         for row in LATHE:
             fixed = not row.run_time and not row.node_only and row.name in wanted
@@ -306,25 +321,23 @@ class OperatedCell:
             self._before = {row.name: values[row.name] for row in CUT_ROWS if row.name in values}
         self._changed_by_hand = False
         await self.clients.set('lathe', {row.name: wanted[row.name] for row in CUT_ROWS})
-        for service in ('reset', 'resume'):
-            await self.clients.call(service)
+        self._end_scenario('is stopped, for another is to begin')
+        await self._reset()
+        await self.clients.call('resume')
         self.playing, self._player = scenario, ScenarioPlayer(scenario)
         self._show_scenario('has begun')
         return f'{scenario.name} has begun.'
 
     async def _go_back(self) -> str:
         """Set what was set before a scenario, which may have had another noise, or none."""
-        if self._before is None or self.playing is not None:
-            raise LatheChatterError('No scenario has ended that anything could be set back from.')
+        if self.playing is not None:
+            raise LatheChatterError(f'{self.playing.name} is being played: stop it first.')
+        if self._before is None:
+            raise LatheChatterError('There is no cut of before a scenario to go back to.')
         await self.clients.set('lathe', self._before)
         self._before = None
-        self._put_scenario('The cut is set as before the scenario.')
-        return 'The cut is set as before the scenario.'
-
-    def _pace(self) -> str:
-        """How the lathe goes on, as it has last said."""
-        told = self._heard.statuses.get(self._names['lathe'], {}).get('pace', {})
-        return str(told.get('message', ''))
+        self._put_scenario('The cut was set as before the scenario.')
+        return 'The cut was set as before the scenario.'
 
     def _play(self) -> None:
         """Carry out what is due, and end in time."""
@@ -333,26 +346,27 @@ class OperatedCell:
         recommended, _ = self._figures.get(RECOMMENDED_SPEED, (math.nan, 0.0))
         step = self._player.due(self._signals.time, recommended)
         if step is not None:
-            self._show_scenario(step.because or 'a step was made')
-            self._run(self._carry_out(step))
+            self._run(self._carry_out(step, self._player))
         elif self._player.finished and self._signals.time >= self.playing.duration:
             self._end_scenario('is over')
 
-    async def _carry_out(self, step: Step) -> None:
+    async def _carry_out(self, step: Step, player: ScenarioPlayer) -> None:
         try:
             if step.accept:
                 await self.clients.call('accept')
             else:
                 await self.clients.set('lathe', step.changes)
         except LatheChatterError as error:
-            self._end_scenario(f'is stopped: {error}')
+            if self._player is player:
+                self._end_scenario(f'is stopped: {error}')
+        else:
+            if self._player is player:
+                self._show_scenario(step.because or 'a step was made')
 
     def _end_scenario(self, how: str) -> None:
         if self.playing is not None:
             name, self.playing, self._player = self.playing.name, None, None
-            self._put_scenario(
-                f'{name} {how.rstrip(".")}. Its cut, and its noise or none, stay set.'
-            )
+            self._put_scenario(f'{name} {how.rstrip(".")}. Its cut and its noise were left so.')
 
     def _show_scenario(self, text: str) -> None:
         """Show what is played, and what it waits for."""

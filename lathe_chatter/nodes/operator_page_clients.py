@@ -141,8 +141,10 @@ class CellClients:
         Raises:
             LatheChatterError: If it refuses, with its sentence.
         """
+        if who not in _DESCRIBED:
+            raise LatheChatterError(f'Nothing of {who!r:.40} can be set from here.')
         if who not in self._types:
-            raise LatheChatterError(f'{self.names.get(who, who)} has not told its parameters yet.')
+            raise self.unknown(who)
         types = {name: Parameter.Type(number) for name, number in self._types[who].items()}
         parameters = [
             Parameter(name, value=float(v) if types.get(name) is Parameter.Type.DOUBLE else v)
@@ -176,6 +178,12 @@ class CellClients:
         if not (there and self._knocks.get_subscription_count()):
             raise self._not_there('lathe')
         self._knocks.publish(Float64(data=IMPULSE.check('impulse', impulse)))
+
+    def unknown(self, who: str) -> LatheChatterError:
+        """Why the parameters of a node are not known."""
+        if not self._clients[who, _SET].service_is_ready():
+            return self._not_there(who)
+        return LatheChatterError(f'The parameters of {self.names[who]} are not known yet.')
 
     def _not_there(self, who: str) -> LatheChatterError:
         return LatheChatterError(f'{self.names[who]} is not there.')

@@ -129,7 +129,7 @@ def _free_domain(screen: Screen) -> Iterator[None]:
     with domain_id(count().__next__) as number:
         os.environ['ROS_DOMAIN_ID'] = str(number)
         if number:
-            screen.say(f'Another run has the ROS domain 0: this one takes {number}.')
+            screen.say(f'Another program may have the ROS domain 0: this one takes {number}.')
         try:
             yield
         finally:
@@ -219,8 +219,8 @@ def _refuse_company(operator: Operator, ours: Mapping[str, int] = _OURS) -> None
     other = next((name for name in _OURS if names.count(name) > ours.get(name, 0)), None)
     if other is not None:
         raise RunFailedError(
-            f'Another {other} is in this ROS domain already: end it, or set ROS_DOMAIN_ID to '
-            'another number.'
+            f'Another {other} is in this ROS domain: end it, or set ROS_DOMAIN_ID to another '
+            'number.'
         )
 
 
@@ -230,12 +230,12 @@ def _await_nodes(operator: Operator, spin: Callable[[], None]) -> None:
     wanted = {'run_recorder', 'chatter_monitor'}
     if operator.scenario.supervisor is not None:
         wanted.add('chatter_supervisor')
-    while not wanted <= set(operator.get_node_names()):
+    while missing := wanted - set(operator.get_node_names()):
         spin()
         _refuse_company(operator)
         if time.monotonic() > until:
-            missing = ' and '.join(sorted(wanted - set(operator.get_node_names())))
-            raise RunFailedError(f'{missing} did not appear within {_START_PATIENCE:.0f} s.')
+            names = ' and '.join(sorted(missing))
+            raise RunFailedError(f'{names} did not appear within {_START_PATIENCE:g} s.')
     _refuse_company(operator, {**_OURS, 'lathe': 0})
 
 
@@ -251,9 +251,7 @@ def _follow(operator: Operator, spin: Callable[[], None], screen: Screen) -> Non
             if operator.failure is not None:
                 raise operator.failure
             if operator.time == 0.0 and time.monotonic() > until:
-                raise RunFailedError(
-                    f'The lathe published no sample within {_START_PATIENCE:.0f} s.'
-                )
+                raise RunFailedError(f'No sample of the lathe came within {_START_PATIENCE:g} s.')
             bar.show(
                 min(operator.time, scenario.duration),
                 what=operator.state if operator.time else 'waiting for the lathe',
@@ -266,21 +264,28 @@ def _serve_page(operator: Operator, spin: Callable[[], None], screen: Screen) ->
     url = f'http://127.0.0.1:{port}/'
     opened = False
     with ProcessGroup() as pages:
-        pages.start('operator_page', parameter_arguments({'port': port}))
-        with screen.working(f'The page is at {url} until Ctrl-C ...'):
-            while True:
-                spin()
-                _refuse_company(operator)
-                try:
-                    pages.check()
-                except NodeFailedError as error:
-                    screen.say(f'{error} It is started again.')
-                    pages.end()
-                    pages.start('operator_page', parameter_arguments({'port': port}))
-                if not opened and answers(port):
-                    opened = True
-                    screen.say(f'The page is at {url} until Ctrl-C.')
-                    open_in_browser(url)
+
+        def follow() -> None:
+            spin()
+            _refuse_company(operator)
+            pages.check()
+
+        while True:
+            pages.start('operator_page', parameter_arguments({'port': port}))
+            with screen.working('Starting the page ...'):
+                while not answers(port):
+                    follow()  # one that cannot start now could not the next time
+            screen.say(f'The page is at {url} until Ctrl-C.')
+            if not opened:
+                opened = True
+                open_in_browser(url)
+            try:
+                with screen.working(f'The page is at {url} until Ctrl-C ...'):
+                    while True:
+                        follow()
+            except NodeFailedError as error:
+                screen.say(f'{error} It is started again.')
+                pages.end()
 
 
 def _finished(operator: Operator, scenario: Scenario) -> bool:

@@ -19,7 +19,7 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import SetBool, Trigger
 
-from lathe_chatter.detection.estimate import HEARD
+from lathe_chatter.detection.estimate import CHATTER, HEARD, UNKNOWN
 from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
@@ -41,7 +41,7 @@ from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.supervisor_limits import unsuited
 from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
-from lathe_chatter.supervisor import Action, Limits, Mode, Seen, Supervisor
+from lathe_chatter.supervisor import NO_MACHINE, Action, Limits, Mode, Seen, Supervisor
 
 _LOOK_PERIOD = 0.02
 _SILENCE = 1.0
@@ -53,6 +53,8 @@ _NO_ANSWER = 2.0
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Two may come at once; who comes late has the newest."""
+_NOT_JUDGED = {'', UNKNOWN, CHATTER}
+"""States in which a flag that falls is no end of the chatter: the flag is that of another cut."""
 _BELIEVED = {Works.FULL.value, Works.CORRECTED.value}
 
 
@@ -133,9 +135,7 @@ class SupervisorNode(ParameterNode):
         values: Mapping[str, Any] = self.values
         names = ('machine_error', 'margin_limit', 'move_early', 'hands_off')
         options = {name: values[name] for name in names}
-        core = Supervisor(self._limits(), Mode(values['mode']), **options)
-        core.hand_moved(time.monotonic())
-        return core
+        return Supervisor(self._limits(), Mode(values['mode']), **options, begun=time.monotonic())
 
     def _limits(self) -> Limits:
         """Its own, and those of the spindle as far as the lathe's or the monitor's machine tells.
@@ -264,6 +264,7 @@ class SupervisorNode(ParameterNode):
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             lasted=self._lasted(now),
             hindrance=self._hindrance(now),
+            judged=self._state not in _NOT_JUDGED and now < self._heard_at + _SILENCE,
             flag_stays=lambda: self._newest_flag() == flag,
         )
 
@@ -278,7 +279,7 @@ class SupervisorNode(ParameterNode):
         """Why nothing may be done, as the end of a sentence; empty where it may."""
         if now > self._heard_at + _SILENCE:
             return 'nothing comes from the monitor'
-        if self._state == 'unknown':
+        if self._state == UNKNOWN:
             return 'the monitor does not know the state of the cut'
         if now < self._lost_at + _LOSS:
             return 'samples were lost'
@@ -292,7 +293,7 @@ class SupervisorNode(ParameterNode):
         if self._answer is not None:
             if time.monotonic() > self._answer[1] + _NO_ANSWER:
                 self._answer = None
-                self._say_of(self._core.refused('it does not answer'))
+                self._say_of(self._core.refused('the lathe does not answer'))
         elif self._cut is not None and self._newest_flag() is not None:
             self._do(self._core.look(self._seen(self._cut)))
 
@@ -331,7 +332,7 @@ class SupervisorNode(ParameterNode):
             success = getattr(result, 'successful', getattr(result, 'success', False))
             if not success:
                 reason = getattr(result, 'reason', getattr(result, 'message', ''))
-                self._say_of(self._core.refused(reason))
+                self._say_of(self._core.refused(f'the lathe refused: {reason}'))
             elif changes is not None:
                 self._take_changes(changes)
 
@@ -359,7 +360,7 @@ class SupervisorNode(ParameterNode):
     def _statuses(self) -> list[Status]:
         hindrance = self._hindrance(time.monotonic())
         if self._core.machine is None:
-            hindrance = hindrance or 'the machine is not known, or does not fit what is heard'
+            hindrance = hindrance or NO_MACHINE
         values = {
             'mode': self._core.mode.value,
             'moves against the present chatter': self._core.moves,

@@ -37,7 +37,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from lathe_chatter.errors import LatheChatterError, StartError
+from lathe_chatter.errors import LatheChatterError, StartError, reason_of
 from lathe_chatter.page.versioned_values import Board, encode_frame
 
 FRAME_PERIOD = 0.05
@@ -129,16 +129,14 @@ class PageServer:
         address = _in_digits(host)
         if not (token or host == 'localhost' or (address and address.is_loopback)):
             raise StartError(
-                f'host {host} lets other machines in: give a token of 16 characters or more, '
-                'which those who act will need.'
+                f'host {host} may let other machines in: give a token of {_SHORTEST_TOKEN} '
+                'characters or more, which those who act will need.'
             )
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         try:
             self._socket = socket.create_server((host, port), family=family)
-        except OSError as error:
-            raise StartError(
-                f'port {port} of {host} cannot be had: {error.strerror or error}.'
-            ) from None
+        except (OSError, UnicodeError) as error:  # the latter of a host that can be no name
+            raise StartError(f'port {port} of {host} cannot be had: {reason_of(error)}.') from None
         self.port: int = self._socket.getsockname()[1]
         everywhere = address.is_unspecified if address else not host
         name = socket.gethostname() if everywhere else host
@@ -148,7 +146,8 @@ class PageServer:
         self.operator: Viewer | None = None
         self._board = Board()
         self._met = 0
-        self._names = {'localhost', socket.gethostname().lower(), socket.getfqdn().lower()}
+        names = ('localhost', host, socket.gethostname(), socket.getfqdn())
+        self._names = {each.lower() for each in names}
         app = Starlette(
             routes=[
                 WebSocketRoute('/feed', self._feed),
@@ -237,17 +236,19 @@ class PageServer:
             text = await self._fulfil(viewer, wish)
         except LatheChatterError as error:
             ok, text = False, str(error)
-        except (KeyError, TypeError, ValueError, OverflowError):
+        except (KeyError, TypeError, ValueError, OverflowError, SystemError):
+            # The last of a message of ROS that cannot hold a whole number of that size.
             viewer.bad += 1
-            ok, text = False, f'The request {wish["do"]!r:.40} is not whole.'
+            ok, text = False, f'The request {wish["do"]!r:.40} makes no sense.'
         viewer.answers.append({'id': wish.get('id'), 'ok': ok, 'text': text})
 
     async def _fulfil(self, viewer: Viewer, wish: Mapping[str, Any]) -> str:
         do = wish['do']
         if do == 'token':
-            if self._token and not hmac.compare_digest(str(wish['token']), self._token):
+            given, token = (text.encode() for text in (str(wish['token']), self._token))
+            if token and not hmac.compare_digest(given, token):
                 await asyncio.sleep(1.0)  # no guessing
-                raise LatheChatterError('That is not the token: you may look, and not act.')
+                raise LatheChatterError('That is not the token.')
             viewer.trusted = True
             return ''
         if do == 'operate':

@@ -101,13 +101,15 @@ class Move:
         growth_rate: Predicted there, the greater one of open and seated where both may be, 1/s.
         margin: By what fraction its depth may still grow; nan where the speed varies.
         kept: Of the removal rate; more than 1 where a faster spindle more than makes up for depth.
-        share: Of the machines that the truth may be, those on which it is stable.
+        tried: How many of the machines that the truth may be it was tried on.
+        share: Of these, those on which it is stable, or more.
     """
 
     cut: Cut
     growth_rate: float
     margin: float
     kept: float
+    tried: int
     share: float
 
     def changes_from(self, cut: Cut) -> dict[str, float]:
@@ -157,7 +159,7 @@ def moves_for(  # noqa: PLR0913, PLR0917 -- a cut, and all that a move has to ke
                 found += [*search.smaller_feeds(odd), *search.varied_speeds(odd)]
         passable = False
         for each in sorted(found, key=lambda each: -each.worth)[:_MOST_TRIED]:
-            move = each.search.move(each.cut, 1.0 - odd / len(machines))
+            move = each.search.move(each.cut, odd)
             if _passes(machines, cut, move, limits, amplitude):
                 passable = True
                 yield move
@@ -293,16 +295,19 @@ class _Search:
         numbers = {name: float(value) for name, value in changes.items()}
         return _Candidate(float(worth), self._cut.with_changes(**numbers), self)
 
-    def move(self, new: Cut, share: float) -> Move:
-        """What is predicted of a cut."""
-        margin = math.nan
-        if not new.speed_variation_amplitude:
+    def move(self, new: Cut, odd: int) -> Move:
+        """What is predicted of a cut that suits all machines but some."""
+        margin, tried = math.nan, len(self._machines)
+        share = 1.0 - odd / tried
+        if new.speed_variation_amplitude:
+            tried, share = min(_VARIED, tried), 1.0
+        else:
             depths = critical_depths(
                 self._machines[0], new.spindle_speed_rpm, seated=True, process=self._process
             )
             margin = float(depths.min()) / new.depth_of_cut - 1.0
         kept = removal_rate(new) / max(removal_rate(self._cut), 1e-30)
-        return Move(new, self._growth(0, new), margin, kept, share)
+        return Move(new, self._growth(0, new), margin, kept, tried, share)
 
     def _growth(self, number: int, new: Cut) -> float:
         """The greatest growth rate of one of the machines, 1/s."""
@@ -324,5 +329,6 @@ def expectation(move: Move) -> str:
     """What is expected of a move, in words."""
     margin = '' if math.isnan(move.margin) else f', margin {100.0 * move.margin:.0f} %'
     kept = f'{100.0 * move.kept:.0f} % of the removal rate'
-    sure = f'on {100.0 * move.share:.0f} % of the machines that this may be'
+    least = '' if move.share == 1.0 else 'at least '
+    sure = f'on {least}{move.share * move.tried:.0f} of {move.tried} machines that this may be'
     return f'predicted: growth {move.growth_rate:.1f} 1/s{margin}, {kept}; stable {sure}'

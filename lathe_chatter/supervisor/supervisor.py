@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from enum import Enum
+from dataclasses import replace
 from itertools import chain
 
 from lathe_chatter.model import Cut, Machine
@@ -18,6 +16,7 @@ from lathe_chatter.supervisor.move_search import (
     expectation,
     moves_for,
 )
+from lathe_chatter.supervisor.seen_and_done import ASKS, NO_MACHINE, Action, Mode, Seen
 from lathe_chatter.supervisor.vibration import SETTLING, VibrationHistory
 
 _LONGEST = 2.0
@@ -49,72 +48,6 @@ _LASTING_FLAG, _EXPECTED_FLAG, _EXPECTED = 1.0, 2.0, 0.2
 where so small a part of the machines is stable: a clearance keeps some chatter small."""
 
 
-ASKS = '~/accept does it'
-"""In the sentence of a supervisor that asks."""
-
-
-class Mode(str, Enum):
-    """Whether it only says what it would do, waits for `~/accept`, or acts."""
-
-    SHADOW = 'shadow'
-    ASK = 'ask'
-    ACT = 'act'
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What is known at a time; nan where something is not.
-
-    Attributes:
-        time: Of a clock that nobody sets, s.
-        cut: As the lathe has it.
-        chatter: The monitor's flag.
-        growth_rate: 1/s.
-        frequency: Hz.
-        amplitude: Of the tool, m.
-        margin: By what fraction the depth may grow.
-        cutting_stiffness: C w as the monitor identified it, N/m.
-        tool_frequency: That the monitor has put in the place of the told one, Hz.
-        spindle_acceleration: At which the spindle follows a change, rev/min per s; 0: at once.
-        lasted: s that the newest change of the cut has been in force at least, by the wall's clock
-            and by the lathe's.
-        hindrance: Why nothing may be done, as the end of a sentence; empty where it may.
-        flag_stays: Whether the flag is as it was, asked once a move has been found: to look for
-            one takes up to a second.
-    """
-
-    time: float
-    cut: Cut
-    chatter: bool = False
-    growth_rate: float = math.nan
-    frequency: float = math.nan
-    amplitude: float = math.nan
-    margin: float = math.nan
-    cutting_stiffness: float = math.nan
-    tool_frequency: float = math.nan
-    spindle_acceleration: float = 0.0
-    lasted: float = math.inf
-    hindrance: str = ''
-    flag_stays: Callable[[], bool] = field(default=lambda: True, compare=False)
-
-
-@dataclass(frozen=True)
-class Action:
-    """What is said, and what is done.
-
-    Attributes:
-        sentence: For people; empty for a step of a ramp.
-        changes: Parameters of the lathe to set together.
-        stop: Whether the lathe is to be paused.
-        settling: s after which it can be judged.
-    """
-
-    sentence: str = ''
-    changes: Mapping[str, float] = field(default_factory=dict)
-    stop: bool = False
-    settling: float = SETTLING
-
-
 class Supervisor:
     """Decides about one machine.
 
@@ -124,7 +57,8 @@ class Supervisor:
         machine_error: Relative standard error of the figures of the machine.
         margin_limit: Margin below which it warns.
         move_early: Whether it also moves then, in the mode `act`.
-        hands_off: s without any action after a person has changed something.
+        hands_off: s without any action after a person has changed something, or it has begun.
+        begun: When it begins, s.
 
     Attributes:
         machine: As told; None where none is known or it does not fit: then nothing is done.
@@ -140,16 +74,18 @@ class Supervisor:
         margin_limit: float = 0.1,
         move_early: bool = False,
         hands_off: float = 2.0,
+        begun: float = -math.inf,
     ) -> None:
         """See nothing yet."""
         self.machine: Machine | None = None
         self.limits, self.mode, self._machine_error = limits, mode, machine_error
         self._margin_limit, self._move_early, self._hands_off = margin_limit, move_early, hands_off
-        self._hand_at = -math.inf
+        self._hand_at, self._hand = begun, 'I have only just begun to watch'
         self._has_seen_quiet = False
         self._vibration = VibrationHistory()
         self._safe_since = math.nan
         self._warned, self._doubt = False, 1.0
+        self._ended = ''  # what is to be said once the end of the chatter is sure
         self._forget()
 
     def _forget(self) -> None:
@@ -168,15 +104,16 @@ class Supervisor:
     def hand_moved(self, time: float) -> Action | None:
         """Somebody else has changed something: hands off, and what was planned is forgotten."""
         on_the_way = math.isfinite(self._target)
+        self._hand = 'somebody else has just changed something'
         self._hand_at, self._offer, self._target, self._refusal = time, None, math.nan, ''
         if not on_the_way:
             return None
         return Action('Somebody else changes the cut: the speed stays where it is on its way.')
 
     def refused(self, reason: str) -> Action:
-        """The lathe did not do what was asked: no more is tried against this chatter."""
+        """The lathe did not say that it did what was asked: no more is tried, for that reason."""
         self._offer, self._target = None, math.nan
-        self._refusal = f'the lathe refused: {reason.rstrip(".")}'
+        self._refusal = reason.rstrip('.')
         return Action(f'Nothing more is done, for {self._refusal}.')
 
     def accept(self, seen: Seen) -> tuple[bool, str, Action | None]:
@@ -202,6 +139,7 @@ class Supervisor:
     # -- chatter -----------------------------------------------------------------------------
 
     def _chatter(self, seen: Seen) -> Action | None:
+        self._ended = ''
         if math.isnan(self._alarm_at):
             self._alarm_at = seen.time
         if self._offer is not None and self._offer[0] != seen.cut:
@@ -245,7 +183,8 @@ class Supervisor:
                 said = f'{why}: {{}} set {change_words(changes, seen.cut)} ({expectation(move)})'
                 settling = min(SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
                 return self._decide(seen, Action(said, changes, settling=settling), move.cut)
-        nothing = 'no move within the limits is predicted to help, and none was left to try'
+        new = ' that was not tried' if self._tried else ''
+        nothing = f'no move within the limits{new} is predicted to help'
         return self._once(f'{why}: {nothing}; a person has to decide.')
 
     def _decide(self, seen: Seen, action: Action, cut: Cut | None = None) -> Action | None:
@@ -262,7 +201,8 @@ class Supervisor:
         if self.mode is Mode.ACT and not spent:
             return self._begin(replace(action, sentence=said('I', '.')), seen)
         self._offer = seen.cut, replace(action, sentence=said('I', ', as was accepted.'))
-        tried = f' {self.moves} moves were no cure.' if spent and self.moves else ''
+        many = '1 move was' if self.moves == 1 else f'{self.moves} moves were'
+        tried = f' {many} no cure.' if spent and self.moves else ''
         return self._once(said('I would', f': {ASKS}.{tried}'))
 
     def _begin(self, action: Action, seen: Seen) -> Action:
@@ -301,9 +241,9 @@ class Supervisor:
         if seen.hindrance or self._refusal:
             return seen.hindrance or self._refusal
         if self.machine is None:
-            return 'the machine is not known, or does not fit what is heard'
+            return NO_MACHINE
         if seen.time < self._hand_at + self._hands_off:
-            return 'somebody else has just changed something'
+            return self._hand
         if seen.chatter and not math.isfinite(seen.amplitude):
             return 'the amplitude is not known'
         return ''
@@ -338,7 +278,12 @@ class Supervisor:
             moves, self._has_seen_quiet = self.moves, True
             self._forget()
             word = 'move' if moves == 1 else 'moves'
-            return Action(f'The chatter has ended{when}; {moves} {word}.')
+            self._ended = f'The chatter has ended{when}; {moves} {word}.'
+        if self._ended and not seen.judged:  # by a lathe or a monitor that has begun anew
+            return None
+        if self._ended:
+            ended, self._ended = self._ended, ''
+            return Action(ended)
         self._has_seen_quiet = True
         self._vibration.note_quiet()
         if not seen.margin < self._margin_limit:

@@ -143,7 +143,7 @@ def test_what_was_set_before_a_scenario_can_be_had_back(browser: Browser) -> Non
     browser.until('cell.lathe_values.force_noise === 0', 'the cut of the scenario', PATIENCE)
     browser.until(f'{said}.includes("; next, at 3 s: ")', 'what it waits for')
     browser.click('[data-call=reset]')
-    browser.until(f'{said}.includes("is stopped by the reset")', 'its end')
+    browser.until(f'{said}.includes("is stopped, for the lathe has begun anew")', 'its end')
     assert browser.run('cell.lathe_values.force_noise') == 0
     browser.click('#back')
     browser.until('cell.lathe_values.force_noise === 0.001', 'the noise of before')

@@ -13,6 +13,7 @@ from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from std_msgs.msg import Bool, String
+from std_srvs.srv import SetBool
 from support.node_bench import LATCHED, Bench
 from support.node_processes import NodeProcesses
 
@@ -155,6 +156,18 @@ def test_a_silent_monitor_keeps_it_from_acting(cell: Callable[..., Cell]) -> Non
     assert there.get('spindle_speed_rpm') == 3000.0
 
 
+def test_a_monitor_that_begins_anew_ends_no_chatter(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=shadow')
+    there.deepen()
+    there.await_words('but only watch')
+    there.nodes.kill('/chatter_monitor')
+    there.await_words('nothing is done, for nothing comes from the monitor')
+    there.flags.clear()
+    there.nodes.start('chatter_monitor')
+    there.bench.spin_until(lambda: [f.data for f in there.flags][:2] == [False, True], 'its flags')
+    assert not there.heard('has ended')
+
+
 @pytest.mark.parametrize(
     ('override', 'words'),
     [
@@ -234,7 +247,7 @@ def test_what_it_says_of_itself_is_so(start: Callable[..., Any], bench: Bench) -
         '/lathe/set_parameters_atomically',
         lambda _request, answer: answer,
     )
-    await_reason('the machine is not known, or does not fit what is heard', 'stable', 5)
+    await_reason('no machine is known, or the monitor works without it', 'stable', 5)
     bench.node.destroy_service(service)
 
 
@@ -253,5 +266,14 @@ def test_a_lathe_that_does_not_answer_is_told(start: Callable[..., Any]) -> None
     node._answer = node._answer[0], node._answer[1] - 10.0
     node._look()
     (status,) = node._statuses()
-    said = 'Nothing more is done, for the lathe refused: it does not answer.'
+    said = 'Nothing more is done, for the lathe does not answer.'
+    assert status.values['newest sentence'] == said
+
+
+def test_a_lathe_that_refuses_is_told(start: Callable[..., Any]) -> None:
+    node, answer = start(SupervisorNode), Future()
+    node._wait(answer)
+    answer.set_result(SetBool.Response(message='The guard has ended it.'))
+    (status,) = node._statuses()
+    said = 'Nothing more is done, for the lathe refused: The guard has ended it.'
     assert status.values['newest sentence'] == said

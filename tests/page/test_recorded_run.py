@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import http.client
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,7 +21,7 @@ from support.browser import Browser, chromium
 from support.two_lathes import FLAGS, record_two_lathes
 
 from lathe_chatter.cli.main import main
-from lathe_chatter.errors import RunReadError
+from lathe_chatter.errors import LatheChatterError, RunReadError
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.model.lathe_parameter_table import parameters_of
 from lathe_chatter.page.live_signals import SIGNALS
@@ -31,6 +32,7 @@ from lathe_chatter.recording.ros_messages import topic_of_type
 from lathe_chatter.samples.codec import SAMPLES_TYPE, encode_block
 
 PATIENCE = 120.0
+NO_CRC = 'a chunk does not have its CRC'
 
 
 @pytest.fixture(scope='module')
@@ -175,6 +177,42 @@ def test_the_first_picture_ends_where_the_run_does(run: Path) -> None:
     page = look(shown, do='at', time=4.1)[0]['page']
     assert page['run']['end'] == pytest.approx(12.0)
     assert page['reading'] == ''
+
+
+def said_of(shown: RecordedRun, what: str) -> str:
+    """What a viewer who has just come is told."""
+    news = shown.frame(Viewer('another', trusted=False))[0]['page']
+    return str(news['run']['state'] if what == 'state' else news[what])
+
+
+def test_how_far_it_is_read_is_said_as_it_is(run: Path) -> None:
+    shown = RecordedRun(run)
+    size = sum(file.stat().st_size for file in run.glob('*.mcap')) / 1e6
+    assert said_of(shown, 'state') == 'The first picture is of some places only.'
+    assert said_of(shown, 'reading') == f'Reading: 0 of {size:.0f} MB.'
+    shown._read_all()
+    assert said_of(shown, 'state') == ''
+    assert said_of(shown, 'reading') == f'What happened is sought in all {size:.0f} MB.'
+    asyncio.run(shown.read())
+    assert said_of(shown, 'reading') == ''
+    with pytest.raises(LatheChatterError) as refused:
+        asyncio.run(shown.act(Viewer('a test', trusted=True), {'do': 'knock'}))
+    assert str(refused.value) == "A recorded run is only looked at: 'knock' cannot be."
+
+
+def test_what_cannot_be_read_is_said(run: Path, tmp_path: Path) -> None:
+    damaged = tmp_path / 'damaged'
+    shutil.copytree(run, damaged)
+    (file,) = damaged.glob('*.mcap')
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 40] = bytes(40)
+    file.write_bytes(data)
+    shown = RecordedRun(damaged)
+    shown._read_all()
+    assert said_of(shown, 'state') == f'Not all can be read: {file.name}: {NO_CRC}.'
+    asyncio.run(shown.read())
+    assert said_of(shown, 'state').startswith('What happened cannot be read: ')
+    assert said_of(shown, 'reading') == ''
 
 
 def test_what_is_no_run_is_a_sentence(tmp_path: Path) -> None:

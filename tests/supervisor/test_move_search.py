@@ -14,7 +14,7 @@ from lathe_chatter.model import BearingContact, Cut, Machine, Mode
 from lathe_chatter.stability import contact_at, critical_depth, floquet, leading_roots
 from lathe_chatter.supervisor import Limits
 from lathe_chatter.supervisor.likely_machines import may_be
-from lathe_chatter.supervisor.move_search import Move, moves_for, removal_rate
+from lathe_chatter.supervisor.move_search import Move, expectation, moves_for, removal_rate
 
 MACHINE = Machine()
 DEEP = Cut(depth_of_cut=1e-3, bearing_contact=BearingContact.NONE)
@@ -82,6 +82,20 @@ def test_where_no_constant_speed_helps_it_is_varied_as_far_as_the_spindle_can() 
         swing = new.speed_variation_amplitude * new.spindle_speed_rpm
         assert 2.0 * np.pi * new.speed_variation_frequency * swing <= 40e3 * 1.001
         assert floquet(MACHINE, new, seated=False).growth_rate < -1.0
+        assert (move.tried, move.share) == (8, 1.0)
+        assert expectation(move).endswith('stable on 8 of 8 machines that this may be')
+
+
+def test_what_is_expected_of_a_move_is_said_in_words() -> None:
+    move = Move(DEEP, growth_rate=-12.34, margin=0.071, kept=0.93, tried=32, share=20 / 32)
+    assert expectation(move) == (
+        'predicted: growth -12.3 1/s, margin 7 %, 93 % of the removal rate; '
+        'stable on at least 20 of 32 machines that this may be'
+    )
+    machines = may_be(MACHINE, 0.01)
+    sure = moves_of(MACHINE, DEEP, Limits())[0]
+    assert (sure.tried, sure.share) == (len(machines), 1.0)
+    assert all(growth(machine, sure.cut) < 0.0 for machine in machines)
 
 
 def test_a_way_on_which_the_vibration_would_grow_beyond_its_limit_is_not_gone() -> None:

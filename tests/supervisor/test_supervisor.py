@@ -60,6 +60,23 @@ def test_of_a_flag_that_was_up_before_no_time_is_said(*, quiet_before: bool, whe
     assert action.sentence == f'The chatter has ended{when}; 0 moves.'
 
 
+def test_a_flag_that_falls_without_a_judgement_is_no_end_of_the_chatter() -> None:
+    supervisor = Supervisor(Limits(), Mode.ACT)
+    supervisor.look(Seen(0.0, CALM))
+    for again in (False, True):  # a monitor that begins anew, and hears the same
+        supervisor.look(Seen(1.0, CALM, chatter=True))
+        assert supervisor.look(Seen(2.0, CALM, judged=False)) is None
+        if again:
+            supervisor.look(Seen(2.5, CALM, chatter=True))
+            action = supervisor.look(Seen(4.0, CALM))
+        else:
+            action = supervisor.look(Seen(4.0, CALM))
+        assert action is not None
+        when = '1.5' if again else '1.0'
+        assert action.sentence == f'The chatter has ended, {when} s after the flag; 0 moves.'
+        assert supervisor.look(Seen(5.0, CALM)) is None
+
+
 def test_no_move_is_made_where_the_flag_fell_while_one_was_looked_for() -> None:
     there = chattering(disturb=lambda _there, seen: replace(seen, flag_stays=lambda: False))
     there.run(2.5)  # in which it moves where the flag stays
@@ -109,9 +126,32 @@ def test_an_offer_lapses_when_somebody_changes_the_cut() -> None:
     there.run(0.3)
     there.set_by_hand(spindle_speed_rpm=3010.0)
     there.run(0.1)
-    done, message = there.accept()
-    assert not done
-    assert message
+    assert there.accept() == (False, 'Nothing is waiting to be accepted.')
+
+
+def test_an_offer_is_not_accepted_for_another_cut_or_while_something_is_in_the_way() -> None:
+    for changed, said in (
+        ({'hindrance': 'samples were lost'}, 'Nothing is done, for samples were lost.'),
+        ({'cut': CALM}, 'Nothing is done, for the cut has changed.'),
+    ):
+        there = chattering(Mode.ASK)
+        there.run(0.3)
+        seen = replace(there.seen(), **changed)  # type: ignore[arg-type]
+        assert there.supervisor.accept(seen) == (False, said, None)
+        again = there.supervisor.accept(there.seen())
+        assert again == (False, 'Nothing is waiting to be accepted.', None)
+
+
+def test_a_hand_amid_a_ramp_leaves_the_speed_where_it_is() -> None:
+    there = chattering(limits=Limits(ramp=100.0))
+    there.run(0.5)
+    speed = there.lathe.cut.spindle_speed_rpm
+    assert speed != 3000.0
+    there.set_by_hand(depth_of_cut=1.01 * DEEP)
+    there.run(0.5)
+    assert 'Somebody else changes the cut: the speed stays where it is on its way.' in there.said
+    assert there.lathe.cut.spindle_speed_rpm == pytest.approx(speed, abs=10.0)
+    assert there.supervisor.hand_moved(there.time) is None  # of none that is on its way
 
 
 def test_in_shadow_it_says_once_what_it_would_do() -> None:
@@ -129,7 +169,7 @@ def test_vibration_beyond_its_limit_that_does_not_fall_stops_the_lathe() -> None
     there = chattering(limits=limits)
     there.run(3.0)
     assert there.stopped
-    assert 'beyond amplitude_limit' in there.said[-1]
+    assert there.said[-1].endswith('beyond amplitude_limit, 5 um: I stop.')
 
 
 def test_a_varied_speed_ends_chatter_where_no_constant_one_does() -> None:
@@ -147,7 +187,53 @@ def test_where_nothing_helps_a_person_has_to_decide() -> None:
     there.run(1.0)
     assert not there.moves
     assert there.said == [there.said[0]]
-    assert 'a person has to decide' in there.said[0]
+    none = 'no move within the limits is predicted to help; a person has to decide.'
+    assert there.said[0].endswith(none)
+
+
+def test_after_moves_that_were_no_cure_nothing_is_said_of_those_that_were_made() -> None:
+    limits = Limits(2990.0, 3010.0, smallest_depth=DEEP, largest_variation=0.0,
+                    amplitude_limit=0.1)  # fmt: skip
+    supervisor = Supervisor(limits, Mode.ACT)
+    supervisor.machine = Machine()
+    supervisor._tried.append(CALM)
+    action = supervisor._move(Seen(1.0, CALM.with_changes(depth_of_cut=DEEP)), 'So')
+    assert action is not None
+    none = 'no move within the limits that was not tried is predicted to help'
+    assert action.sentence == f'So: {none}; a person has to decide.'
+
+
+@pytest.mark.parametrize(('most', 'tried'), [(0, ''), (1, ' 1 move was no cure.')])
+def test_a_move_more_than_it_may_make_is_asked_for(most: int, tried: str) -> None:
+    supervisor = Supervisor(Limits(most_moves=most), Mode.ACT)
+    supervisor.machine = Machine()
+    supervisor.moves = most
+    action = supervisor._move(Seen(1.0, CALM.with_changes(depth_of_cut=DEEP)), 'So')
+    assert action is not None
+    assert not action.changes
+    assert action.sentence.endswith(f': ~/accept does it.{tried}')
+
+
+def test_without_a_machine_or_an_amplitude_nothing_is_done() -> None:
+    for machine, said in (
+        (None, 'no machine is known, or the monitor works without it'),
+        (Machine(), 'the amplitude is not known'),
+    ):
+        supervisor = Supervisor(Limits(), Mode.ACT)
+        supervisor.machine = machine
+        action = supervisor.look(Seen(1.0, CALM, chatter=True, frequency=130.0))
+        assert action is not None
+        assert action.sentence == f'Chatter at 130.0 Hz: nothing is done, for {said}.'
+
+
+def test_one_that_has_only_just_begun_holds_still_and_blames_nobody() -> None:
+    supervisor = Supervisor(Limits(), Mode.ACT, begun=0.0)
+    supervisor.machine = Machine()
+    action = supervisor.look(Seen(1.9, CALM, chatter=True))
+    assert action is not None
+    assert action.sentence == (
+        'Chatter flagged: nothing is done, for I have only just begun to watch.'
+    )
 
 
 @pytest.mark.parametrize(('rate', 'words'), [(4.0, 'growing at 4.0'), (-4.0, 'growth rate -4.0')])
@@ -241,4 +327,6 @@ def test_a_refusal_is_said_and_ends_the_attempts() -> None:
     there.refuse = lambda _action: 'spindle_speed_rpm may not be set.'
     there.run(2.0)
     assert len(there.changed) == 1
-    assert any('refused: spindle_speed_rpm may not be set' in sentence for sentence in there.said)
+    refused = 'the lathe refused: spindle_speed_rpm may not be set.'
+    assert f'Nothing more is done, for {refused}' in there.said
+    assert there.said[-1].endswith(f': nothing is done, for {refused}')

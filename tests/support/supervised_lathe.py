@@ -149,7 +149,7 @@ class SupervisedLathe:
 
     def _carry_out(self, action: Action) -> None:
         if reason := self.refuse(action):
-            self._note(self.supervisor.refused(reason), self.seen())
+            self._note(self.supervisor.refused(f'the lathe refused: {reason}'), self.seen())
             return
         self.stopped = self.stopped or action.stop
         if action.changes:
