@@ -11,22 +11,16 @@ from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
+from support.loaded_modules import loaded_by
 
 import lathe_chatter as lc
 from lathe_chatter.html_table import html_table
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
 
-def loaded_by(statement: str) -> set[str]:
-    """The modules that a fresh interpreter loads for a statement."""
-    call = [sys.executable, '-X', 'importtime', '-c', statement]
-    told = subprocess.run(call, check=True, capture_output=True, text=True).stderr
-    return {line.rpartition('|')[2].strip() for line in told.splitlines()}
-
-
 def test_the_import_loads_nothing_but_itself() -> None:
     """Less than 50 ms by far, whatever else the machine does."""
-    more = loaded_by('import lathe_chatter') - loaded_by('import importlib, typing')
+    more = loaded_by('-c', 'import lathe_chatter') - loaded_by('-c', 'import importlib, typing')
     assert more == {'lathe_chatter'}
 
 

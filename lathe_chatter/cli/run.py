@@ -14,7 +14,6 @@ from pathlib import Path
 
 from lathe_chatter.cli.common_options import add_json, path_of, utf8
 from lathe_chatter.cli.console import INTERRUPTED, Screen
-from lathe_chatter.cli.report import show_run
 from lathe_chatter.cli.scenario_verdict import scenario_help, verdict
 from lathe_chatter.errors import (
     NodeFailedError,
@@ -139,6 +138,8 @@ def _scenario(file: Path, options: Namespace) -> Scenario:
 
 def _report(output: Path, screen: Screen) -> History:
     """Report a run, and name those that its recorder has begun after it, as somebody wished."""
+    from lathe_chatter.cli.report import show_run  # with all that draws, and wanted only here
+
     history, metadata = read_history(output), output / 'metadata.yaml'
     screen.json(show_run(history, screen))
     ended = metadata.stat().st_mtime if metadata.exists() else math.inf

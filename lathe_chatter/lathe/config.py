@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lathe_chatter.errors import ParameterError
-from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import (
     LATHE,
@@ -19,6 +18,9 @@ from lathe_chatter.model.lathe_parameter_table import (
 )
 from lathe_chatter.model.machine_and_sampling import LatheSetup
 from lathe_chatter.model.machine_file import MachineDescription
+
+if TYPE_CHECKING:
+    from lathe_chatter.lathe.virtual_lathe import VirtualLathe
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class LatheConfig:
 
     def lathe(self) -> VirtualLathe:
         """A lathe that is started like this."""
+        from lathe_chatter.lathe.virtual_lathe import VirtualLathe  # loads Numba, wanted only here
+
         values = {entry.name: getattr(self.setup, entry.name) for entry in fields(LatheSetup)}
         return VirtualLathe(cut=self.cut, **values)
 

@@ -15,10 +15,10 @@ from lathe_chatter.nodes import recorder_services
 from lathe_chatter.nodes.diagnostics import Diagnostics, Status
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameter_tables import RECORDER
 from lathe_chatter.nodes.real_time_loop import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.nodes.recorder_diagnostics import log_news, mixture, recording_status
+from lathe_chatter.nodes.recorder_parameters import RECORDER
 from lathe_chatter.nodes.recorder_topic_selection import TopicWatch, selection
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.run_folders import RunFolders

@@ -15,8 +15,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.parameter_tables import RECORDED_TOPICS
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic, Write, topic_of
+from lathe_chatter.nodes.recorder_parameters import RECORDED_TOPICS
 from lathe_chatter.nodes.topic_types import MissingTypeError, message_type
 from lathe_chatter.recording import Topic
 from lathe_chatter.recording.provenance import PUBLISHERS

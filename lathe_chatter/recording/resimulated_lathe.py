@@ -11,8 +11,7 @@ import numpy as np
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ReplayError
 from lathe_chatter.lathe.change_and_knock_sentences import BEGINNING, Change, Knock
-from lathe_chatter.lathe.config import recorded_config
-from lathe_chatter.lathe.virtual_lathe import VirtualLathe
+from lathe_chatter.lathe.config import LatheConfig, recorded_config
 from lathe_chatter.recording.cut_log import CutLog, CutSession
 from lathe_chatter.recording.sample_blocks import SampleBlocks
 
@@ -55,7 +54,7 @@ class Replay:
         self.session: CutSession | None = None
         self._logged = log.logged
         self._waiting: list[Change | Knock] = []
-        self._lathe = VirtualLathe()
+        self._lathe = LatheConfig().lathe()
 
     def begin(self, session: CutSession) -> None:
         """Begin a session, at time zero.

@@ -22,7 +22,7 @@ from lathe_chatter.model import BearingContact, Cut
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.monitor_node import MonitorNode
-from lathe_chatter.nodes.parameter_tables import RECORDED_TOPICS
+from lathe_chatter.nodes.recorder_parameters import RECORDED_TOPICS
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block
 from lathe_chatter.stability import rightmost_root

@@ -21,6 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
+from support.loaded_modules import COMPUTING, loaded_by
 from support.node_bench import Bench
 
 from lathe_chatter import __version__
@@ -75,6 +76,28 @@ def test_the_services_start_split_and_stop(
     answer = bench.call(Trigger, '/run_recorder/start', Trigger.Request())
     assert answer.success, answer.message
     assert recorder.run == tmp_path / 'run-2'
+
+
+RECORDED = """
+import sys
+import rclpy
+from lathe_chatter.nodes.recorder_node import RecorderNode
+
+rclpy.init(args=['--ros-args', '-p', f'output:={sys.argv[1]}'])
+node = RecorderNode()
+node.begin()
+while not node.messages_of('/rosout'):
+    rclpy.spin_once(node)
+node.stop()
+"""
+
+
+def test_a_recorder_loads_nothing_that_computes(domain: int, tmp_path: Path) -> None:
+    """Else it would begin half a second later."""
+    folder = str(tmp_path / 'run')
+    loaded = loaded_by('-c', RECORDED, folder, ROS_DOMAIN_ID=str(domain))
+    assert 'lathe_chatter.recording.run_writer' in loaded
+    assert not loaded & COMPUTING
 
 
 def test_a_loss_on_the_way_is_counted(

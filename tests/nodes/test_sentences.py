@@ -643,6 +643,7 @@ WALKED_ELSEWHERE = {
     'diagnostics.py': STATISTICS,
     'parameter_descriptor.py': TABLES,
     'parameter_tables.py': TABLES,
+    'recorder_parameters.py': TABLES,
 }
 """Modules whose words are in no table here, and where they are met."""
 
