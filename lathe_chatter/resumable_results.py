@@ -46,6 +46,8 @@ class ResultFile(Generic[Entry]):
         self.entries: list[Entry] = []
         first = json_line(header)
         try:
+            if path.exists() and not path.is_file():  # a device may be read without end
+                raise ResultFileError(f'{path} is no file: name another.')
             found = path.read_bytes() if path.exists() else b''
             whole = found[: found.rfind(b'\n') + 1]
             # Only of a file that is ours a last line that was cut off may go.

@@ -84,6 +84,24 @@ def test_a_file_that_does_not_begin_as_its_own_is_left_as_it_is(
     assert path.read_bytes() == content
 
 
+@pytest.mark.parametrize('path', ['/dev/null', '/dev/full'])
+def test_a_device_is_said_to_be_no_file(path: str) -> None:
+    with refused_memory(), pytest.raises(ResultFileError) as refused:
+        spread_into(path, HEADER, square, range(3))
+    assert str(refused.value) == f'{path} is no file: name another.'
+
+
+@contextmanager
+def refused_memory() -> Iterator[None]:
+    """For where it would be read without end."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (8 * 2**30, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
 def test_a_first_line_that_was_cut_off_is_written_anew(tmp_path: Path) -> None:
     path = tmp_path / 'a.jsonl'
     spread_into(path, HEADER, square, range(3))

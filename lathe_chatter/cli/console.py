@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -54,8 +55,11 @@ class Screen:
         """Print JSON, or leave it out."""
         self._json = json
         self._console = Console(stderr=json, markup=False, emoji=False, highlight=False)
+        self._draws = self._console.is_terminal and not self._console.is_dumb_terminal
         if not (self._console.is_terminal or os.environ.get('COLUMNS')):
             self._console.width = _ANY  # a pipe has no width, unless the user says one
+        elif not self._draws:  # of which the library believes that it has 80
+            self._console.size = shutil.get_terminal_size()
 
     def say(self, text: str, style: str = '') -> None:
         """Print text: on a terminal broken between words, in a pipe one line as it is."""
@@ -124,7 +128,7 @@ class Screen:
     @contextmanager
     def working(self, text: str) -> Iterator[None]:
         """Show that something is going on; only on a terminal."""
-        if self._console.is_terminal:
+        if self._draws:
             with self._console.status(Text(text)):
                 yield
         else:
@@ -145,7 +149,7 @@ class Screen:
             total: When all is done; None where nobody knows yet.
             unit: Of the total, empty for a count of things.
         """
-        shown = self._console.is_terminal
+        shown = self._draws
         columns: list[ProgressColumn] = [
             TextColumn('{task.description}', markup=False),
             BarColumn(bar_width=None),
@@ -154,7 +158,8 @@ class Screen:
         if self._console.width >= _NARROW:
             columns += [TimeElapsedColumn(), TimeRemainingColumn()]
         progress = Progress(*columns, console=self._console, transient=True, disable=not shown)
-        # The library ends a bar with an empty line even where it has shown none.
+        # The library ends a bar with an empty line even where it has shown none, as on a terminal
+        # that is dumb.
         with progress if shown else nullcontext():
             yield Bar(progress, what, total)
 

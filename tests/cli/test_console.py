@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import math
 import os
+import pty
 import re
+import struct
 import subprocess
 import sys
+import termios
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -136,6 +140,34 @@ def test_brackets_in_a_path_are_kept(tmp_path: Path, capsys: pytest.CaptureFixtu
     told = capsys.readouterr()
     assert json.loads(told.out)['run'] == str(folder)
     assert f'picture  {folder}/report.png\n' in told.err
+
+
+ON_A_TERMINAL = """
+from lathe_chatter.cli.console import Screen
+screen = Screen()
+with screen.progress('doing', 2.0, 's') as bar, screen.working('working'):
+    bar.show(1.0)
+screen.say('word ' * 20)
+"""
+
+
+@pytest.mark.parametrize('columns', [40, 90])
+def test_a_terminal_that_cannot_draw_gets_lines_of_its_width_alone(columns: int) -> None:
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack('HHHH', 24, columns, 0, 0))
+    others = {name: value for name, value in os.environ.items() if name != 'COLUMNS'}
+    subprocess.run(
+        [sys.executable, '-c', ON_A_TERMINAL],
+        stdout=theirs,
+        env={**others, 'TERM': 'dumb'},
+        check=True,
+    )
+    lines = os.read(ours, 4096).decode().splitlines()
+    os.close(ours)
+    os.close(theirs)
+    assert {word for line in lines for word in line.split()} == {'word'}
+    assert all(lines)
+    assert max(map(len, lines)) == columns - 1
 
 
 def test_nothing_begins_with_an_empty_line(tmp_path: Path) -> None:
