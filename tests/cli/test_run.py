@@ -298,7 +298,7 @@ def test_a_lathe_that_is_there_already_is_left_alone(
         foreign.send_signal(signal.SIGINT)
         said = foreign.stderr.read()
     assert done.returncode == 2, done.stdout + done.stderr
-    assert 'Another lathe is in this ROS domain already' in done.stderr
+    assert 'Another lathe is in this ROS domain: end it' in done.stderr
     assert 'depth_of_cut' not in said
 
 
