@@ -234,6 +234,8 @@ class ChatterDetector:
                 BandDetector(self._machine, band, form, self._thresholds, adviser, alarm_age)
                 for band, adviser in zip(bands, self._advisers, strict=False)
             ]
+            for k, judge in enumerate(self._judges):
+                judge.slower = self._judges[:k]
             listens = bool(bands) and (form.mixed or not form.angle)
             self._lines = None
             if listens:
