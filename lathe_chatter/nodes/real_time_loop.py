@@ -7,7 +7,9 @@ counted as lag and reported.
 The loop: an executor costs ten times as much as a tick of the lathe, and hands a timer from
 thread to thread before it fires. So the loop sleeps by itself until the next tick, and lets the
 executor look for requests only every few ticks; where one was waiting, after the very next tick.
-Where ticks leave no time, requests get as much of it as the ticks had, and no more.
+Where ticks leave no time, requests get as much of it as the ticks had, and no more. A mark behind
+what waits tells when it is done: an executor driven by events takes a request in one go and serves
+it in a later one, so that of a flood many goes serve nothing, and timers stand behind them.
 
 Scheduling: Linux shares a core fairly, but a task that wakes may wait while others finish their
 slices, a few ms. Since 6.12 a task may ask for slices of its own that are short, and is then
@@ -28,7 +30,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from rclpy.context import Context
-from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 RCLError: type[Exception] = rclpy_implementation.RCLError
@@ -196,7 +198,7 @@ class Schedule:
         now = time.monotonic_ns()
         for k, (period, task) in enumerate(self._tasks):
             if now >= self._due[k]:
-                self._due[k] = max(self._due[k] + period, now)
+                self._due[k] = now + period
                 task()
 
 
@@ -210,6 +212,7 @@ class Served:
         serve_period: ns after which the executor looks for requests that nobody knows of.
         serve_at: When it does next, ns of time.monotonic_ns().
         spent: What waking it took since, ns.
+        marked: Whether a mark stands behind what waits, and was not reached yet.
     """
 
     executor: Executor
@@ -217,6 +220,7 @@ class Served:
     serve_period: int = SERVE_PERIOD
     serve_at: int = 0
     spent: int = 0
+    marked: bool = False
 
     def serve(self, now: int, next_wake: int = 0) -> None:
         """Serve what waits, and what comes before the next wake if more is likely to come.
@@ -229,9 +233,30 @@ class Served:
         """
         waits = not self.serve_at or next_wake - now > self.serve_period
         until = next_wake - _MARGIN if waits else 0
-        busy = _serve(self.executor, self.node.requests, until, self.spent)
+        busy = self._serve(until)
         self.serve_at, self.spent = 0 if busy else now + self.serve_period, 0
         self.node.update_scheduling()
+
+    def _serve(self, until: int) -> bool:
+        """Serve what waits, and what comes until a time, ns; whether more is likely to come.
+
+        The ticks since the last time have their share: as much goes to what waits, and no more.
+        """
+        first = before = self.node.requests.served
+        now = time.monotonic_ns()
+        share_ends = now + max(self.spent, _LEAST_SHARE)
+        if not (self.marked or isinstance(self.executor, SingleThreadedExecutor)):
+            self.marked = True
+            self.executor.create_task(self._reach_mark)
+        while True:
+            self.executor.spin_once(timeout_sec=max(until - now, 0) / SECOND)
+            now, served = time.monotonic_ns(), self.node.requests.served
+            if now >= until and (now >= share_ends or not (self.marked or served != before)):
+                return self.marked or served != first
+            before = served
+
+    def _reach_mark(self) -> None:
+        self.marked = False
 
 
 def spin_in_ticks(executor: Executor, node: Tickable, ended: Callable[[], bool]) -> None:
@@ -283,26 +308,6 @@ def _spin(served: Sequence[Served], ended: Callable[[], bool]) -> None:
                 each.node.wake()
                 now, before = time.monotonic_ns(), now
                 each.spent += now - before
-
-
-def _serve(executor: Executor, requests: RequestLoad, until: int, spent: int) -> bool:
-    """Serve what waits, and what comes in a while; whether anything did.
-
-    Args:
-        executor: Serves one request at a time.
-        requests: Counts them.
-        until: When the next tick wants to be made, ns of time.monotonic_ns().
-        spent: What the ticks have had since requests were served last, ns: their share, too.
-    """
-    first = before = requests.served
-    now = time.monotonic_ns()
-    share_ends = now + max(spent, _LEAST_SHARE)
-    while True:
-        executor.spin_once(timeout_sec=max(until - now, 0) / SECOND)
-        now = time.monotonic_ns()
-        if now >= until and (requests.served == before or now >= share_ends):
-            return requests.served != first
-        before = requests.served
 
 
 class RealTime:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
@@ -16,7 +17,8 @@ from support.node_bench import messages_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
 from lathe_chatter.nodes.node_main import make_executor
-from lathe_chatter.nodes.real_time_loop import Served, spin_in_ticks
+from lathe_chatter.nodes.real_time_loop import SECOND, Schedule, Served, spin_in_ticks
+from lathe_chatter.nodes.simulation_control import RunState
 
 PATIENCE = 60.0
 
@@ -98,3 +100,42 @@ def test_where_ticks_leave_no_time_requests_have_as_much_as_the_ticks(lathe: Lat
     finally:
         executor.remove_node(lathe)
         executor.shutdown()
+
+
+def test_what_a_flood_has_left_holds_up_nobody(lathe: LatheNode, context: Context) -> None:
+    """The executor takes each request, and has it served behind all that came meanwhile."""
+    client = Node('client', context=context)
+    floods = client.create_client(SetParameters, '/lathe/set_parameters')
+    asked = client.create_client(SetBool, '/lathe/pause')
+    executor = make_executor(lathe)
+    executor.add_node(lathe)
+    served = Served(executor, lathe)
+    end = time.monotonic() + PATIENCE
+    while not (asked.service_is_ready() and floods.service_is_ready()):
+        assert time.monotonic() < end
+        served.serve(time.monotonic_ns())
+    request = SetParameters.Request(parameters=messages_of({'depth_of_cut': 0.0004}))
+    for _ in range(300):
+        for _ in range(10):
+            floods.call_async(request)
+        time.sleep(0.002)
+        served.serve(time.monotonic_ns())
+    asked.call_async(SetBool.Request(data=True))
+    serves = 0
+    while lathe.run_state is RunState.RUNNING:
+        assert serves < 200
+        served.spent = int(SECOND)  # what ticks took meanwhile
+        served.serve(time.monotonic_ns())
+        serves += 1
+        time.sleep(0.01)
+    executor.remove_node(lathe)
+    client.destroy_node()
+
+
+def test_what_is_late_is_done_once() -> None:
+    done: list[int] = []
+    schedule = Schedule((3600.0, lambda: done.append(1)))
+    schedule._due = [time.monotonic_ns() - 10 * 3600 * SECOND]
+    schedule.run()
+    schedule.run()
+    assert done == [1]
