@@ -37,7 +37,7 @@ from lathe_chatter.nodes.parameter_tables import MONITOR, ModelSource
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.real_time_loop import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine
-from lathe_chatter.nodes.sample_receiver import SampleBatch, SampleSubscription
+from lathe_chatter.nodes.sample_receiver import SampleBatch, SampleSubscription, SendingPace
 from lathe_chatter.precompile import DETECTOR_LOOP, precompile
 from lathe_chatter.samples.continuity import BlockOrder, Continuity, times_of
 
@@ -49,6 +49,7 @@ _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
+_SECOND = 0.9, 1.9  # s from one report to the next, where neither comes late
 _UNKNOWN = 'unknown'
 _TOPIC = 'lathe/samples'
 _FASTEST_PACE = 100.0
@@ -90,13 +91,15 @@ class MonitorNode(ParameterNode):
         self._speed_range = self._own_speeds()
         self._detector = self._new_detector()
         self._lathe_cut = LatheCutWatch(self, self._follow_depth, self._ask)
-        self._continuity, self._since, self._complaint = Continuity(), 'nothing yet', ''
+        self._continuity, self._pace = Continuity(), SendingPace()
+        self._since, self._complaint = 'nothing yet', ''
         self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
         self._logged_advice, self._mode, self._faults = Advice(), Mode.WAITING, tuple[str, ...]()
         self._senders, self._silent = list[str](), False  # several senders: nothing is judged
         self._heard_at = self._leapt_at = self._newest = self._next_report = -math.inf
         self._figures, self._details = dict[str, float](), dict[str, object]()
-        self._reported_at, self._reported_lost = -math.inf, 0
+        self._reported_at = self._report_at = -math.inf
+        self._reported_lost, self._was_silent = 0, True
 
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
         self._state_publisher = self._publisher(String, 'state', _LATCHED)
@@ -136,7 +139,7 @@ class MonitorNode(ParameterNode):
                 times: Array = samples[:, columns.index('time')]
             else:
                 times = times_of(samples, columns)
-            if not self._follow(times):
+            if not self._follow(times, batch.sent):
                 return
             estimate = self._detector.update(samples, columns)
         except LatheChatterError as error:
@@ -155,7 +158,7 @@ class MonitorNode(ParameterNode):
         self._complaint = str(error)
         self.bounded_log.error(self._complaint, 'complaint')
 
-    def _follow(self, times: Array) -> bool:
+    def _follow(self, times: Array, sent: tuple[int, int]) -> bool:
         """Notice lost samples and another lathe; whether the samples can be judged."""
         now, heard_at = time.monotonic(), self._heard_at
         before, self._heard_at = self._continuity.last, now
@@ -167,10 +170,12 @@ class MonitorNode(ParameterNode):
         jumped = before is not None and times[0] - before > possible
 
         def is_another() -> bool:
-            many = len(self._subscription.publishers()) > 1
-            return jumped or many or self._subscription.has_new_publisher()
+            many = len(self._subscription.publishers()) > 1  # with one that was killed of late
+            mixed = many and not self._pace.allows(times[0], sent[0])
+            return jumped or mixed or self._subscription.has_new_publisher()
 
         order = self._continuity.join(times, is_another)
+        self._pace.follow(times, sent, begins=order in {BlockOrder.FIRST, BlockOrder.RESTART})
         start = f'{times[0]:.6f} s'
         if order is BlockOrder.CONTIGUOUS:
             self._end_silence(start)
@@ -192,6 +197,7 @@ class MonitorNode(ParameterNode):
         else:
             again = f'the lathe started again, and I with it from {start} on'
             self._say('restart', f'At {before:.6f} s: {again}.')
+        self._silent = False
         self._flag_since = math.nan  # a time of the run before is none of this one
         if self._flag:
             self._say('withdrawn', withdrawn(times[0]))
@@ -338,7 +344,11 @@ class MonitorNode(ParameterNode):
             self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')
         if self._asked is not None and not self._asked.answered:
             self._asked.ask()
-        silent = self._heard_at == self._reported_at
+        now = time.monotonic()
+        # A timer that is late fires again soon; and what came while this node stood still waits.
+        is_second = _SECOND[0] < now - self._report_at < _SECOND[1]
+        silent = self._heard_at == self._reported_at and (is_second or self._was_silent)
+        self._report_at, self._was_silent = now, silent
         if silent and self._senders:
             self._senders, self._continuity.last = [], None
         elif silent and not self._silent and self._continuity.last is not None:

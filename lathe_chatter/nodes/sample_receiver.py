@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,8 @@ from lathe_chatter.samples.continuity import follow_evenly
 _TOPIC = 'lathe/samples'
 _BACKLOG = 10_000
 """Blocks of samples that may wait here: 1 s of a lathe at 20 times real time."""
+_PACES = 3.0
+"""Times as fast as so far that a lathe may cut."""
 _AT_ONCE = 400
 """Samples that are handed on at once, if they wait: 40 ms of a lathe of 10 kHz."""
 
@@ -32,11 +34,13 @@ class SampleBatch(NamedTuple):
         samples: One block, or several that follow each other (n, k), n > 0.
         columns: Names of the k columns.
         evenly: Whether their times are known to be numbers that follow each other evenly.
+        sent: When the first and the last block of them was sent, ns by the clock of who sent it.
     """
 
     samples: Array
     columns: tuple[str, ...]
     evenly: bool
+    sent: tuple[int, int] = (0, 0)
 
 
 class SampleSubscription:
@@ -56,7 +60,7 @@ class SampleSubscription:
         self._decoder = SampleDecoder()
         self._known: frozenset[tuple[int, ...]] = frozenset()
         self.best_effort = False
-        self._waiting: list[tuple[Array, tuple[str, ...]]] = []
+        self._waiting: list[tuple[Array, tuple[str, ...], int]] = []
         self._messages = PolledSubscription(
             node,
             Float64MultiArray,
@@ -98,36 +102,66 @@ class SampleSubscription:
     def take(self) -> Iterator[SampleBatch]:
         """What has come since, in order."""
         blocks: list[Array] = []
+        sent: list[int] = []
         names: tuple[str, ...] = ()
         count = 0
         waiting, self._waiting = self._waiting, []
         for part in (waiting, self._read()):
-            for samples, columns in part:
+            for samples, columns, at in part:
                 if columns != names or count >= _AT_ONCE:
-                    yield from join_blocks(blocks, names)
-                    blocks, names, count = [], columns, 0
+                    yield from join_blocks(blocks, names, sent)
+                    blocks, sent, names, count = [], [], columns, 0
                 if len(samples):
                     blocks.append(samples)
+                    sent.append(at)
                     count += len(samples)
-        yield from join_blocks(blocks, names)
+        yield from join_blocks(blocks, names, sent)
 
-    def _read(self) -> Iterator[tuple[Array, tuple[str, ...]]]:
-        """Blocks and their columns, in order."""
-        for serialised, _info in self._messages.take():
+    def _read(self) -> Iterator[tuple[Array, tuple[str, ...], int]]:
+        """Blocks, their columns and when they were sent, in order."""
+        for serialised, info in self._messages.take():
             try:
-                yield self._decoder.decode(serialised)
+                yield *self._decoder.decode(serialised), info['source_timestamp'] or 0
             except LatheChatterError as error:  # noqa: PERF203 -- one bad message spoils no other
                 self._complain(error)
 
 
-def join_blocks(blocks: list[Array], columns: tuple[str, ...]) -> Iterator[SampleBatch]:
+class SendingPace:
+    """How fast a lathe has cut so far, by when it has sent its samples."""
+
+    def __init__(self) -> None:
+        """Nothing was sent yet."""
+        self._first = self._last = 0.0, 0
+
+    def follow(self, times: Array, sent: tuple[int, int], *, begins: bool) -> None:
+        """Samples of times (n,), s, have come, the first and last of which were sent at, ns."""
+        if begins:
+            self._first = float(times[0]), sent[0]
+        self._last = float(times[-1]), sent[1]
+
+    def allows(self, start: float, sent: int) -> bool:
+        """Whether it can have cut what is missing before a sample: another's comes at once.
+
+        Args:
+            start: Simulated time of the sample, s.
+            sent: When it was sent, ns.
+        """
+        (first, first_at), (last, last_at) = self._first, self._last
+        passed = last_at - first_at
+        return passed > 0 and (start - last) * passed < _PACES * (sent - last_at) * (last - first)
+
+
+def join_blocks(
+    blocks: list[Array], columns: tuple[str, ...], sent: Sequence[int] = ()
+) -> Iterator[SampleBatch]:
     """Blocks as one where they follow each other evenly, else one by one."""
     if not blocks:
         return
+    when = sent or [0] * len(blocks)
     if 'time' in columns:
         joined = np.concatenate(blocks)
         if follow_evenly(joined[:, columns.index('time')]):
-            yield SampleBatch(joined, columns, evenly=True)
+            yield SampleBatch(joined, columns, evenly=True, sent=(when[0], when[-1]))
             return
-    for samples in blocks:
-        yield SampleBatch(samples, columns, evenly=False)
+    for samples, at in zip(blocks, when, strict=True):
+        yield SampleBatch(samples, columns, evenly=False, sent=(at, at))

@@ -317,3 +317,18 @@ def test_a_space_after_the_comma_of_a_label_is_no_part_of_a_name(
     names = [f' {name}' for name in SAMPLE_COLUMNS]
     publisher.publish(encode_block(chatters(0.1), names))
     bench.spin_until(lambda: node._continuity.samples == 1000, 'the samples')
+
+
+def test_reports_that_follow_soon_know_of_no_silence(
+    bench: Bench, start: Callable[..., Any]
+) -> None:
+    """As after a standstill of the monitor: a timer that is late fires again soon."""
+    shop = Shop(bench, start)
+    node = shop.monitor()
+    shop.send(bench.talk(Float64MultiArray, '/lathe/samples'), chatters(0.5))
+    bench.spin_until(lambda: node._continuity.samples == 5000, 'all samples')
+    for _ in range(3):
+        node._report()
+    assert not node._silent
+    (samples, _) = node._statuses()
+    assert samples.message == 'all samples came'

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -220,3 +221,21 @@ def logged(run: Any) -> list[str]:
     """What the recorder said, as it is in the run."""
     heard = run.messages('/rosout')
     return [each.message.msg for each in heard if each.message.name == 'run_recorder']
+
+
+def test_samples_lost_soon_after_a_kill_are_no_other_run(cell: Cell) -> None:
+    """The graph keeps the publisher of a killed lathe for 20 s: it is no second one."""
+    cell.start(*CHATTER)
+    reports = cell.reports
+    cell.wait(lambda: cell.flags and cell.flags[-1].data, 'the flag')
+    cell.nodes.kill('/lathe')
+    cell.nodes.start('lathe', *CHATTER)
+    cell.wait(lambda: reports.value(HEARD, 'restarts of the lathe') == '1', 'the next lathe')
+    cell.wait(lambda: cell.flags[-1].data, 'its flag')
+    flags = len(cell.flags)
+    cell.nodes.signal('/chatter_monitor', signal.SIGSTOP)
+    cell.wait_for_samples(blocks=4000)  # twice of what a lathe keeps for its readers
+    cell.nodes.signal('/chatter_monitor', signal.SIGCONT)
+    cell.wait(lambda: reports.value(HEARD, 'gaps') == '1', 'the gap')
+    assert reports.value(HEARD, 'restarts of the lathe') == '1'
+    assert all(flag.data for flag in cell.flags[flags:])

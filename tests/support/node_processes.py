@@ -71,6 +71,10 @@ class NodeProcesses:
         process.kill()
         process.wait()
 
+    def signal(self, name: str, number: signal.Signals) -> None:
+        """Stop one, or let it go on."""
+        self._running[name].send_signal(number)
+
     def interrupt(self, name: str) -> None:
         """End one as Ctrl-C does; it must end well."""
         process = self._running.pop(name)
