@@ -95,10 +95,16 @@ class Numbering:
             now: Steady time, s; infinite at the end, when nothing more will settle.
         """
         late = [each for each in self._sequences if each.begun <= now - _SETTLING]
-        for sequence in late[1:]:
+        # Who counts from lower numbers is another publisher sooner than one that goes on.
+        for sequence in sorted(late[1:], key=lambda each: not self._goes_on(each)):
             if len(self._sequences) <= max(publishers, 1):
                 return
             self._join(sequence)
+
+    def _goes_on(self, sequence: _Sequence) -> bool:
+        return any(
+            each.heard <= sequence.begun and each.last < sequence.first for each in self._sequences
+        )
 
     def _join(self, sequence: _Sequence) -> None:
         """Join a sequence to the one that it goes on, if one had ended when it began."""

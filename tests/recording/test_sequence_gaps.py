@@ -65,6 +65,11 @@ def test_a_publisher_that_was_started_again_is_no_loss() -> None:
     assert follow([*range(1, 100), *range(1, 50)], 1) == 0
 
 
+def test_a_gap_after_a_publisher_that_took_the_place_of_another_is_found() -> None:
+    """Also where the first messages of the new one were sent before it was heard."""
+    assert follow([*range(1, 500), *range(30, 100), *range(150, 300)], 2) == 50
+
+
 def test_a_gap_of_one_publisher_among_others_is_found() -> None:
     first = iter([*range(1, 50), *range(60, 150)])
     second = iter(range(1000, 1200))
