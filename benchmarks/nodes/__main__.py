@@ -11,7 +11,8 @@ accounts of the processes, lateness from the time at which DDS was handed each b
 losses from the times in the payload. Lateness is counted from the earliest in a hundred ticks:
 the tick after one that came late may be made up to half a period early, which is told too.
 `hour`, `repeats` (of all node tests, two at a time beside a burner) and `chaos` (kills, stops,
-floods and jumps of /clock at random) only run if asked for.
+floods and jumps of /clock at random, of all nodes and the cell; it ends with 1 if one crashed or
+hung, said what was not so, or did not tell of a loss once) only run if asked for.
 """
 
 from __future__ import annotations

@@ -2,151 +2,250 @@
 
 from __future__ import annotations
 
-import json
 import random
-import re
+import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from urllib.request import urlopen
 
-import numpy as np
 from ear import Ear, ear
-from processes import LATHE, MONITOR, NODES, RECORDER, script
+from processes import NODES, script
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
+from witness import Done, Session, Witness
+from witness_of_runs import judge
 
 from lathe_chatter.nodes.joint_state_message import time_message
-from lathe_chatter.recording import read_run, verify
-from lathe_chatter.recording.run_summary import SUMMARY
+from lathe_chatter.page.server import answers, free_port
 
-CUT_EVENT = re.compile(r'At [\d.]+ s: (knock|depth_of_cut)')
-MOST_LINES = 60.0
-"""Lines a minute that a node may log, what happened to the cut aside."""
+APART, TOGETHER = ('lathe', 'chatter_monitor', 'run_recorder'), ('cell',)
+ALWAYS = ('chatter_supervisor', 'operator_page')
 PATIENCE = 60.0
+FLAG_PATIENCE = 15.0
+"""s that chatter has to be flagged, on a machine that is busy."""
+_DEEP = {'depth_of_cut': 0.001, 'bearing_contact': 'none'}
+"""What chatters at every speed that a lathe is started with."""
 
 
 class Nodes:
-    """The three nodes, and everything that they have said."""
+    """All nodes, of which lathe, monitor and recorder may be one process."""
 
     def __init__(self, folder: Path, chance: random.Random) -> None:
         """Nothing runs yet."""
-        self.folder, self.chance = folder, chance
+        self.folder, self.chance, self.done = folder, chance, Done()
         self.running: dict[str, subprocess.Popen[bytes]] = {}
         self.clocked = False
-        self.faults: list[str] = []
-        self.done: Counter[str] = Counter()
-        self.finished: list[Path] = []
-        self.killed: list[Path] = []
+        self.counts: Counter[str] = Counter()
+        self.port = free_port(18080)
         self._runs = 0
+
+    def note(self, what: str) -> None:
+        """Note what is done now, for who looks for the cause of a fault."""
+        with (self.folder / 'acts.txt').open('a') as acts:
+            acts.write(f'{time.time():.3f} {what}\n')
 
     def start(self, name: str) -> None:
         """Start one that does not run."""
-        node, values = {'lathe': LATHE, 'monitor': MONITOR, 'recorder': RECORDER}[name], []
-        if name == 'recorder':
-            self._runs += 1
-            values.append(f'output:={self.run}')
-        if name == 'lathe':
-            self.clocked = self.chance.random() < 0.3
-            depth = self.chance.choice((0.0, 0.0005, 0.001))
-            values += [f'use_sim_time:={str(self.clocked).lower()}', f'depth_of_cut:={depth}']
-            values.append(f'tick_rate:={self.chance.choice((250, 500, 1000))}.0')
+        values: list[str] = []
+        members = APART if name == 'cell' else (name,)
+        for member in members:
+            of_it = {'lathe': self._lathe, 'run_recorder': self._recorder}.get(member, list)()
+            values += [f'{member}:{value}' for value in of_it]
+        if name == 'chatter_supervisor':
+            values.append(f'mode:={self.chance.choice(("shadow", "ask", "act"))}')
+        if name == 'operator_page':
+            values.append(f'port:={self.port}')
         words = [word for value in values for word in ('-p', value)]
+        self.note(f'start {name} {" ".join(values)}')
         with (self.folder / f'{name}.log').open('ab') as log:
             self.running[name] = subprocess.Popen(  # noqa: S603 -- our own modules
-                [*NODES, node, '--ros-args', *words],
+                [*NODES, name, *(['--ros-args', *words] if words else [])],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
             )  # fmt: skip
+        for member in members:
+            self.done.sessions.append(Session(member, time.time()))
 
-    @property
-    def run(self) -> Path:
-        """The newest run."""
-        return self.folder / f'run-{self._runs}'
+    def _lathe(self) -> list[str]:
+        self.clocked = self.chance.random() < 0.3
+        depth = self.chance.choice((0.0, 0.0005, 0.001))
+        rate = self.chance.choice((250, 500, 1000))
+        clock = str(self.clocked).lower()
+        return [f'use_sim_time:={clock}', f'depth_of_cut:={depth}', f'tick_rate:={rate}.0']
+
+    def _recorder(self) -> list[str]:
+        self._runs += 1
+        return [f'output:={self.folder / f"run-{self._runs}"}']
 
     def look(self) -> None:
         """See that all run, but those that were ended."""
-        for name, process in self.running.items():
+        for name, process in [*self.running.items()]:
             if process.poll() is not None:
-                self.faults.append(f'{name} ended by itself with {process.returncode}')
+                self.done.faults.append(f'{name} ended by itself with {process.returncode}')
+                self._gone(name, process.returncode)
                 self.start(name)
+        process = self.running.get('operator_page')
+        if process is not None and answers(self.port):
+            with urlopen(f'http://127.0.0.1:{self.port}/', timeout=PATIENCE) as page:
+                if page.status != 200:
+                    self.done.faults.append(f'the page answers {page.status}')
 
     def end(self, name: str, number: signal.Signals) -> None:
         """End one by a signal."""
-        process = self.running.pop(name)
+        process = self.running[name]
+        self.note(f'{number.name} {name}')
         process.send_signal(number)
         try:
             code = process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             code = process.wait()
-            self.faults.append(f'{name} did not end on {number.name}')
+            self.done.faults.append(f'{name} did not end on {number.name}')
         expected = -number if number == signal.SIGKILL else 0
         if code not in {expected, -number}:
-            self.faults.append(f'{name} ended with {code} on {number.name}')
-        if name == 'recorder':
-            (self.killed if code else self.finished).append(self.run)
+            self.done.faults.append(f'{name} ended with {code} on {number.name}')
+        self._gone(name, code)
 
+    def _gone(self, name: str, code: int) -> None:
+        del self.running[name]
+        members = APART if name == 'cell' else (name,)
+        for member in members:
+            self.done.newest(member).ended, self.done.newest(member).code = time.time(), code
+        if 'run_recorder' in members:
+            run = self.folder / f'run-{self._runs}'
+            (self.done.killed if code else self.done.finished).append(run)
 
-def measure_chaos(minutes: float, seed: int) -> None:
-    """Do something to a node every few seconds, and see that nothing false comes of it."""
-    chance = random.Random(seed)  # noqa: S311 -- no secret
-    began = time.monotonic()
-    with tempfile.TemporaryDirectory() as name, ear() as listener:
-        nodes = Nodes(Path(name), chance)
-        clock = _Clock(listener, nodes)
-        for node in ('lathe', 'monitor', 'recorder'):
-            nodes.start(node)
-        while time.monotonic() < began + 60.0 * minutes:
-            _spin(listener, clock, chance.uniform(2.0, 8.0))
-            nodes.look()
-            act = chance.choice((_kill, _restart, _stop, _flood, clock.disturb))
-            nodes.done[act.__name__.strip('_')] += 1
-            act(nodes, lambda seconds: _spin(listener, clock, seconds))
-        _spin(listener, clock, 5.0)
-        for node in ('lathe', 'monitor', 'recorder'):
-            if node in nodes.running:
-                nodes.end(node, signal.SIGINT)
-        _judge(nodes, (time.monotonic() - began) / 60.0)
+    def stop(self, name: str, wait: Wait, seconds: float) -> None:
+        """Let one stand still."""
+        self.note(f'stop {name} for {seconds} s')
+        self.running[name].send_signal(signal.SIGSTOP)
+        began = time.time()
+        wait(seconds)
+        self.running[name].send_signal(signal.SIGCONT)
+        for member in APART if name == 'cell' else (name,):
+            self.done.stops.append((member, began, time.time()))
 
-
-def _spin(listener: Ear, clock: _Clock, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        clock.publish()
-        listener.executor.spin_once(timeout_sec=0.01)
+    def kill_all(self) -> None:
+        """Leave nothing behind, whatever happened."""
+        for process in self.running.values():
+            process.kill()
+            process.wait()
 
 
 Wait = Callable[[float], None]
 
 
+def measure_chaos(minutes: float, seed: int) -> None:
+    """Do something to a node every few seconds, and see that nothing false comes of it.
+
+    Raises:
+        SystemExit: If something does.
+    """
+    chance = random.Random(seed)  # noqa: S311 -- no secret
+    began = time.monotonic()
+    folder = Path(tempfile.mkdtemp(prefix=f'chaos-{seed}-'))
+    with ear() as listener:
+        nodes = Nodes(folder, chance)
+        clock, witness = _Clock(listener, nodes), Witness(listener.node, nodes.done)
+
+        def wait(seconds: float) -> None:
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                clock.publish()
+                listener.executor.spin_once(timeout_sec=0.01)
+                witness.take()
+
+        acts = (
+            _kill, _restart, _stop, _flood, _regroup, clock.disturb, _Chatter(listener, witness),
+        )  # fmt: skip
+        try:
+            for node in (*APART, *ALWAYS):
+                nodes.start(node)
+            while time.monotonic() < began + 60.0 * minutes:
+                wait(chance.uniform(2.0, 8.0))
+                nodes.look()
+                witness.look()
+                act = chance.choice(acts)
+                nodes.note(act.__name__)
+                nodes.counts[act.__name__.strip('_')] += 1
+                act(nodes, wait)
+            wait(PATIENCE / 4.0)
+            witness.look()
+            for node in [*nodes.running]:
+                nodes.end(node, signal.SIGINT)
+        finally:
+            nodes.kill_all()
+        judge(folder, nodes.done, nodes.counts, (time.monotonic() - began) / 60.0)
+    shutil.rmtree(folder)  # kept where there is a fault
+
+
 def _kill(nodes: Nodes, wait: Wait) -> None:
-    name = nodes.chance.choice(list(nodes.running))
+    _kill_one(nodes, nodes.chance.choice([*nodes.running]), wait)
+
+
+def _kill_one(nodes: Nodes, name: str, wait: Wait) -> None:
     nodes.end(name, signal.SIGKILL)
     wait(nodes.chance.uniform(0.0, 3.0))
     nodes.start(name)
 
 
 def _restart(nodes: Nodes, wait: Wait) -> None:
-    name = nodes.chance.choice(list(nodes.running))
+    name = nodes.chance.choice([*nodes.running])
     nodes.end(name, nodes.chance.choice((signal.SIGINT, signal.SIGTERM)))
     wait(nodes.chance.uniform(0.0, 1.0))
     nodes.start(name)
 
 
 def _stop(nodes: Nodes, wait: Wait) -> None:
-    process = nodes.chance.choice(list(nodes.running.values()))
-    process.send_signal(signal.SIGSTOP)
-    wait(nodes.chance.uniform(0.1, 3.0))
-    process.send_signal(signal.SIGCONT)
+    name = nodes.chance.choice([*nodes.running])
+    # A lathe keeps 4 s of its samples for a reader.
+    nodes.stop(name, wait, nodes.chance.choice((0.3, 1.5, 3.0, 9.0)))
 
 
 def _flood(nodes: Nodes, wait: Wait) -> None:
     rates = nodes.chance.choice((('500', '200'), ('5000', '0'), ('0', '2000')))
     with script('flood.py', *rates):
         wait(nodes.chance.uniform(2.0, 5.0))
+
+
+def _regroup(nodes: Nodes, wait: Wait) -> None:
+    """Three processes instead of one, or one instead of three."""
+    before, after = (TOGETHER, APART) if 'cell' in nodes.running else (APART, TOGETHER)
+    for name in before:
+        nodes.end(name, nodes.chance.choice((signal.SIGINT, signal.SIGTERM, signal.SIGKILL)))
+    wait(nodes.chance.uniform(0.0, 3.0))
+    for name in after:
+        nodes.start(name)
+
+
+class _Chatter:
+    """Make the cut chatter, and once it is flagged end, kill or stop somebody."""
+
+    __name__ = 'disturbed while flagged'
+
+    def __init__(self, listener: Ear, witness: Witness) -> None:
+        """Find the lathe."""
+        self._witness = witness
+        self._set = listener.node.create_client(SetParameters, '/lathe/set_parameters')
+
+    def __call__(self, nodes: Nodes, wait: Wait) -> None:
+        until = time.monotonic() + FLAG_PATIENCE
+        while not self._witness.flag and time.monotonic() < until:
+            if self._set.service_is_ready():
+                deep = [Parameter(name, value=value) for name, value in _DEEP.items()]
+                request = SetParameters.Request(parameters=[p.to_parameter_msg() for p in deep])
+                self._set.call_async(request).add_done_callback(self._set.remove_pending_request)
+            wait(1.0)
+        if not self._witness.flag:
+            nodes.counts['not flagged in time'] += 1
+            return
+        wait(nodes.chance.uniform(0.0, 5.0))
+        nodes.chance.choice((_kill, _restart, _stop))(nodes, wait)
 
 
 class _Clock:
@@ -156,71 +255,24 @@ class _Clock:
         """Begin far from zero."""
         self._nodes = nodes
         self._publisher = listener.node.create_publisher(Clock, '/clock', 10)
-        self._offset, self._stopped = 10**12, 0.0
+        self._offset, self._stopped, self._shown = 10**12, 0.0, time.time()
 
     def publish(self) -> None:
         """Show the time."""
         if self._nodes.clocked and time.monotonic() > self._stopped:
             self._publisher.publish(Clock(clock=time_message(time.monotonic_ns() + self._offset)))
+            now, before = time.time(), self._shown
+            self._shown = now
+            if now - before > 1.0:
+                self._nodes.done.clock_stops.append((before, now))
 
     def disturb(self, nodes: Nodes, wait: Wait) -> None:
         """Jump ahead or back, or stand still."""
         if nodes.chance.random() < 0.3:
             self._stopped = time.monotonic() + 4.0
         else:
-            self._offset += int(1e9 * nodes.chance.choice((3600.0, 20.0, 1.0, -1.0, -60.0)))
+            jump = nodes.chance.choice((3600.0, 20.0, 1.0, -1.0, -60.0))
+            nodes.note(f'/clock jumps by {jump} s')
+            self._offset += int(1e9 * jump)
+            nodes.done.clock_jumps.append(time.time())
         wait(1.0)
-
-
-def _judge(nodes: Nodes, minutes: float) -> None:
-    """Print what was done, and every fault.
-
-    Raises:
-        SystemExit: If there is one.
-    """
-    for log in sorted(nodes.folder.glob('*.log')):
-        text = log.read_text(errors='replace')
-        if 'Traceback' in text:
-            nodes.faults.append(
-                f'{log.stem}: a traceback: {text[text.index("Traceback") :][:3000]}'
-            )
-        lines = [line for line in text.splitlines() if not CUT_EVENT.search(line)]
-        starts = sum(nodes.done.values()) + 1
-        print(f'{log.stem}: {len(lines)} lines')
-        if len(lines) > MOST_LINES * minutes + 20 * starts:
-            nodes.faults.append(f'{log.stem} logged {len(lines)} lines in {minutes:.0f} min')
-    missing = sum(_lost(run, nodes) for run in nodes.finished)
-    for run in nodes.killed:
-        _lost(run, nodes)
-    done = ', '.join(f'{count} {name}' for name, count in sorted(nodes.done.items()))
-    print(
-        f'{minutes:.1f} min of chaos: {done}; {len(nodes.finished)} runs finished and '
-        f'{len(nodes.killed)} cut short; {missing} samples missing in the former, each told once'
-    )
-    if nodes.faults:
-        sys.exit('\n'.join(nodes.faults))
-
-
-def _lost(run: Path, nodes: Nodes) -> int:
-    """How many samples a run lacks; that its recorder counted as many, if it could finish."""
-    if not run.exists() or not any(run.iterdir()):
-        return 0
-    found = verify(run)
-    opened = read_run(run)
-    if '/lathe/samples' not in found.last:  # it ended before the first came
-        return 0
-    times = opened.samples(columns=['time']).columns['time']
-    steps = np.rint(np.diff(times) * 1e4).astype(int)
-    missing = int(np.sum(steps[steps > 1] - 1))
-    notes = {note.name: note.values for note in opened.notes()}
-    if SUMMARY in notes:
-        counted = json.loads(notes[SUMMARY]['samples'])['/lathe/samples']['lost']
-        if counted != missing:
-            nodes.faults.append(f'{run.name}: {missing} samples are missing, {counted} were told')
-        # A recorder that stood still for too long may lose messages of others as well.
-        told = [each.text for each in found.findings if each.loss]
-        if not missing and told:
-            nodes.faults.append(f'{run.name}: nothing is missing, and verify says: {told}')
-    elif run in nodes.finished:
-        nodes.faults.append(f'{run.name}: finished, and says nothing at its end')
-    return missing
