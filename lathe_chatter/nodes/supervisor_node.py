@@ -80,7 +80,7 @@ class SupervisorNode(ParameterNode):
         self._state = ''
         self._chatter: bool | None = None  # until the monitor has said
         self._heard_at = self._lost_at = -math.inf
-        self._lost = self._restarts = -1.0
+        self._lost = self._restarts = self._cut_end = -1.0
         self._reports = DiagnosticsListener()
         self._told: dict[str, dict[str, Any]] = {}  # of lathe and monitor
         self._cut_is_new = False  # for the monitor's figures
@@ -179,6 +179,10 @@ class SupervisorNode(ParameterNode):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         self._reports.take(message)
+        end = self._reports.number(self._lathe, 'cut', 'simulated time, s', self._cut_end)
+        if end < self._cut_end:  # also where the monitor has not heard both runs
+            self._begin_again()
+        self._cut_end = end
         if not any(status.name.startswith(f'{self._monitor}: ') for status in message.status):
             return
         self._cut_is_new = False
@@ -187,9 +191,14 @@ class SupervisorNode(ParameterNode):
         if lost > self._lost >= 0:
             self._lost_at = time.monotonic()
         restarts = number('restarts of the lathe', 0.0)
-        if restarts > self._restarts >= 0:  # it may be another machine, and another cut
-            self._ask_again()
+        if restarts > self._restarts >= 0:
+            self._begin_again()
         self._lost, self._restarts = lost, restarts
+
+    def _begin_again(self) -> None:
+        """Another run, of what may be another machine with another cut."""
+        self._core.another_run()
+        self._ask_again()
 
     def _ask_again(self) -> None:
         """What the lathe is, is not known any more."""

@@ -110,6 +110,11 @@ class Supervisor:
             return None
         return Action('Somebody else changes the cut: the speed stays where it is on its way.')
 
+    def another_run(self) -> None:
+        """The lathe has begun again: what was known of chatter was known of the run before."""
+        self._vibration, self._has_seen_quiet, self._ended = VibrationHistory(), False, ''
+        self._forget()
+
     def refused(self, reason: str) -> Action:
         """The lathe did not say that it did what was asked: no more is tried, for that reason."""
         self._offer, self._target = None, math.nan

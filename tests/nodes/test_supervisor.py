@@ -156,6 +156,22 @@ def test_a_silent_monitor_keeps_it_from_acting(cell: Callable[..., Cell]) -> Non
     assert there.get('spindle_speed_rpm') == 3000.0
 
 
+def test_a_cell_that_begins_anew_ends_no_chatter(cell: Callable[..., Cell]) -> None:
+    """Lathe and monitor both: nobody counts a restart, and the cut is another."""
+    there = cell('mode:=shadow')
+    there.deepen()
+    there.await_words('but only watch')
+    there.nodes.kill('/chatter_monitor')
+    there.nodes.kill(LATHE)
+    there.await_words('nothing is done, for nothing comes from the monitor')
+    there.nodes.start('chatter_monitor')
+    there.nodes.start('lathe', 'depth_of_cut:=0.0003', 'bearing_contact:=none')
+    there.bench.spin_until(lambda: there.status() == 'ready', 'a monitor that judges')
+    since = len(there.reports)
+    there.bench.spin_until(lambda: len(there.reports) > since + 20, 'some seconds more')
+    assert not there.heard('has ended')
+
+
 def test_a_monitor_that_begins_anew_ends_no_chatter(cell: Callable[..., Cell]) -> None:
     there = cell('mode:=shadow')
     there.deepen()

@@ -77,6 +77,13 @@ def test_a_flag_that_falls_without_a_judgement_is_no_end_of_the_chatter() -> Non
         assert supervisor.look(Seen(5.0, CALM)) is None
 
 
+def test_chatter_of_a_run_before_has_not_ended_in_another() -> None:
+    supervisor = Supervisor(Limits(), Mode.ACT)
+    supervisor.look(Seen(1.0, CALM, chatter=True))
+    supervisor.another_run()
+    assert supervisor.look(Seen(2.0, CALM)) is None
+
+
 def test_no_move_is_made_where_the_flag_fell_while_one_was_looked_for() -> None:
     there = chattering(disturb=lambda _there, seen: replace(seen, flag_stays=lambda: False))
     there.run(2.5)  # in which it moves where the flag stays
