@@ -182,6 +182,8 @@ NO_SENTENCE = {
     'largest amplitude of a speed variation, fraction of the speed; 0: none',
     'vibration of the tool beyond which growing chatter is stopped, and none goes on its way',
     'moves by itself against one chatter',
+    # For programmers, of every package whose names are loaded when they are used.
+    'module {} has no attribute {}',
 }  # fmt: skip
 
 
