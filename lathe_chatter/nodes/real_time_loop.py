@@ -245,7 +245,9 @@ class Served:
         first = before = self.node.requests.served
         now = time.monotonic_ns()
         share_ends = now + max(self.spent, _LEAST_SHARE)
-        if not (self.marked or isinstance(self.executor, SingleThreadedExecutor)):
+        # A mark takes as much as a look that finds nothing: it is set where something was found.
+        idle = bool(self.serve_at)
+        if not (idle or self.marked or isinstance(self.executor, SingleThreadedExecutor)):
             self.marked = True
             self.executor.create_task(self._reach_mark)
         while True:
