@@ -27,12 +27,23 @@ that none is left with a whole file when the others have ended."""
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """`--dist loadfile`, but for some files."""
+    """`--dist loadfile`, but for some files, and where a worker crashes."""
     from xdist.scheduler import LoadFileScheduling
 
     class Scheduling(LoadFileScheduling):  # type: ignore[misc]
         def _split_scope(self, nodeid: str) -> str:
             file: str = super()._split_scope(nodeid)
             return nodeid if file in SINGLY else file
+
+        def remove_node(self, node: Any) -> Any:
+            """What a worker had done stays done when it crashes.
+
+            Put back beside the rest, as files without a test to run, it would keep whoever gets
+            it waiting for ever.
+            """
+            files = self.assigned_work[node]
+            for file in [name for name, tests in files.items() if all(tests.values())]:
+                del files[file]
+            return super().remove_node(node)
 
     return Scheduling(config, log) if config.getvalue('dist') == 'loadfile' else None

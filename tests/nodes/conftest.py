@@ -30,8 +30,8 @@ from lathe_chatter.precompile import DETECTOR_LOOP, LATHE_LOOP, MOVE_LOOPS, prec
 PATIENCE = 120.0
 """s: the start of a node takes 20 s where others keep the machine busy."""
 SETTLING = 0.3
-"""s in which DDS hears that processes have ended: Fast DDS may crash, or wait for itself for ever,
-where the participant of a test goes meanwhile (`node_main.exit_within`)."""
+"""s in which DDS hears that processes have ended, on an idle core: Fast DDS may crash, or wait for
+itself for ever, where the participant of a test goes meanwhile (`node_main.exit_within`)."""
 SpinUntil = Callable[..., None]
 
 
@@ -58,7 +58,7 @@ def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
     processes = _time_of_processes()
     yield executor
     if _time_of_processes() != processes:
-        time.sleep(SETTLING)
+        time.sleep(SETTLING * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
     for node in executor.get_nodes():
         executor.remove_node(node)
         node.destroy_node()
