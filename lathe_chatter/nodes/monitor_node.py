@@ -24,6 +24,7 @@ from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.lathe_cut_watch import LatheCutWatch
 from lathe_chatter.nodes.monitor_sentences import (
     SENTENCES,
+    best_effort,
     clearance,
     details,
     onset,
@@ -51,7 +52,6 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
 _SECOND = 0.9, 1.9  # s from one report to the next, where neither comes late
 _UNKNOWN = 'unknown'
-_TOPIC = 'lathe/samples'
 _FASTEST_PACE = 100.0
 """Simulated seconds that a lathe cuts in one; and those of a backlog."""
 _MIXED = 1.0
@@ -220,7 +220,7 @@ class MonitorNode(ParameterNode):
         if len(names) < 2 or now - leapt_at > _MIXED:
             return False
         self._senders = names
-        self._say('two publishers', two_publishers(names))
+        self._say('two publishers', two_publishers(names, self._subscription.topic))
         self._set_state(_UNKNOWN)
         self._diagnostics.publish_changes(self._statuses())
         return True
@@ -340,8 +340,7 @@ class MonitorNode(ParameterNode):
     def _report(self) -> None:
         """Once a second; a second without samples means that nothing is known any more."""
         if self._subscription.adapt():
-            lost = 'so what gets lost is not sent again'
-            self._say('best effort', f'A publisher of {_TOPIC} offers best effort only, {lost}.')
+            self._say('best effort', best_effort(self._subscription.topic))
         if self._asked is not None and not self._asked.answered:
             self._asked.ask()
         now = time.monotonic()
@@ -381,7 +380,8 @@ class MonitorNode(ParameterNode):
         if self._complaint:
             return Status('samples', ERROR, self._complaint, values)
         if self._senders:
-            return Status('samples', ERROR, two_publishers(self._senders), values)
+            several = two_publishers(self._senders, self._subscription.topic)
+            return Status('samples', ERROR, several, values)
         if silent:
             return Status('samples', WARN, 'no samples come', values)
         if self._faults:

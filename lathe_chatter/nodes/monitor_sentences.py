@@ -186,6 +186,12 @@ def sensors(estimate: Estimate) -> str:
     return f'At {estimate.time:.6f} s: {", ".join(estimate.faults)}; {works}.'
 
 
-def two_publishers(names: Sequence[str]) -> str:
+def two_publishers(names: Sequence[str], topic: str) -> str:
     """Who publishes what only one may."""
-    return f'{several_publish(names, "lathe/samples")}: nothing is judged until one is left.'
+    return f'{several_publish(names, topic)}: nothing is judged until one is left.'
+
+
+def best_effort(topic: str) -> str:
+    """That not every publisher of a topic sees to it that what it sends comes."""
+    lost = 'so what gets lost is not sent again'
+    return f'A publisher of {topic} offers best effort only, {lost}.'

@@ -51,12 +51,14 @@ class SampleSubscription:
         complain: Takes what is wrong with a message that is no block of samples.
 
     Attributes:
+        topic: Its name, remapped where it is.
         best_effort: Whether a publisher is heard that does not send again what gets lost.
     """
 
     def __init__(self, node: Node, complain: Callable[[LatheChatterError], None]) -> None:
         """Subscribe."""
         self._node, self._complain = node, complain
+        self.topic = node.resolve_topic_name(_TOPIC)
         self._decoder = SampleDecoder()
         self._known: frozenset[tuple[int, ...]] = frozenset()
         self.best_effort = False
@@ -70,9 +72,7 @@ class SampleSubscription:
         )
 
     def _endpoints(self) -> list[TopicEndpointInfo]:
-        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(
-            self._node.resolve_topic_name(_TOPIC)
-        )
+        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self.topic)
         return found
 
     def remember_publishers(self) -> None:

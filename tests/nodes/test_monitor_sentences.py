@@ -160,7 +160,7 @@ def two_publishers(shop: Shop) -> None:
         shop.bench.executor.spin_once(timeout_sec=0.01)
     shop.says('two publishers')
     (entry,) = [entry for entry in shop.said() if ' publish ' in entry.msg]
-    assert entry.msg.startswith('/lathe_a and /lathe_b publish')
+    assert entry.msg.startswith('/lathe_a and /lathe_b publish /lathe/samples,')
     assert node._continuity.lost == 0
     assert len(shop.said()) < 10
     shop.bench.let_go(others[1])
@@ -177,6 +177,8 @@ def best_effort(shop: Shop) -> None:
     shop.bench.spin_until(talker.get_subscription_count, 'a subscription that fits')
     shop.send(talker, chatters(0.2))
     shop.bench.spin_until(lambda: node._continuity.samples > 0, 'samples')
+    shop.says('best effort')
+    assert any(entry.msg.startswith('A publisher of /lathe/samples') for entry in shop.said())
 
 
 def asks_the_lathe(shop: Shop) -> None:
