@@ -41,6 +41,8 @@ LOOK_UP = 0.1
 """s after which a node that nothing happens to looks whether it was told to end."""
 SERVE_PERIOD = 10_000_000
 """ns after which the executor looks for requests that nobody knows of."""
+_MARK_PERIOD = 100_000_000
+"""ns after which it is looked whether more waits than is served."""
 _MARGIN = 500_000
 """ns before the next tick in which the executor does not wait any more: it may come back late."""
 _LEAST_SHARE = 1_000_000
@@ -213,6 +215,7 @@ class Served:
         serve_at: When it does next, ns of time.monotonic_ns().
         spent: What waking it took since, ns.
         marked: Whether a mark stands behind what waits, and was not reached yet.
+        mark_at: When the next is set at the latest, ns of time.monotonic_ns().
     """
 
     executor: Executor
@@ -221,6 +224,7 @@ class Served:
     serve_at: int = 0
     spent: int = 0
     marked: bool = False
+    mark_at: int = 0
 
     def serve(self, now: int, next_wake: int = 0) -> None:
         """Serve what waits, and what comes before the next wake if more is likely to come.
@@ -245,10 +249,11 @@ class Served:
         first = before = self.node.requests.served
         now = time.monotonic_ns()
         share_ends = now + max(self.spent, _LEAST_SHARE)
-        # A mark takes as much as a look that finds nothing: it is set where something was found.
-        idle = bool(self.serve_at)
-        if not (idle or self.marked or isinstance(self.executor, SingleThreadedExecutor)):
-            self.marked = True
+        # Not in each idle look, for a mark takes as much as that. Not only where requests were
+        # served: what others tell waits, too.
+        due = not self.serve_at or now >= self.mark_at
+        if due and not (self.marked or isinstance(self.executor, SingleThreadedExecutor)):
+            self.marked, self.mark_at = True, now + _MARK_PERIOD
             self.executor.create_task(self._reach_mark)
         while True:
             self.executor.spin_once(timeout_sec=max(until - now, 0) / SECOND)

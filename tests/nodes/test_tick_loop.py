@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.srv import ListParameters, SetParameters
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -16,6 +17,7 @@ from std_srvs.srv import SetBool
 from support.node_bench import messages_of
 
 from lathe_chatter.nodes.lathe_node import LatheNode
+from lathe_chatter.nodes.monitor_node import MonitorNode
 from lathe_chatter.nodes.node_main import make_executor
 from lathe_chatter.nodes.real_time_loop import SECOND, Schedule, Served, spin_in_ticks
 from lathe_chatter.nodes.simulation_control import RunState
@@ -129,6 +131,37 @@ def test_what_a_flood_has_left_holds_up_nobody(lathe: LatheNode, context: Contex
         serves += 1
         time.sleep(0.01)
     executor.remove_node(lathe)
+    client.destroy_node()
+
+
+def test_what_others_tell_holds_up_nobody_either(context: Context) -> None:
+    """A monitor hears every change of every parameter, and counts none of them as a request."""
+    monitor = MonitorNode(context=context, by_timer=False)
+    client = Node('client', context=context)
+    tells = client.create_publisher(ParameterEvent, '/parameter_events', 5000)
+    asked = client.create_client(ListParameters, '/chatter_monitor/list_parameters')
+    executor = make_executor(monitor)
+    executor.add_node(monitor)
+    served = Served(executor, monitor)
+    end = time.monotonic() + PATIENCE
+    while not (asked.service_is_ready() and tells.get_subscription_count()):
+        assert time.monotonic() < end
+        served.serve(time.monotonic_ns())
+    for _ in range(300):
+        for _ in range(10):
+            tells.publish(ParameterEvent(node='/another'))
+        served.serve(time.monotonic_ns())
+        time.sleep(0.01)
+    served_before = monitor.requests.served
+    asked.call_async(ListParameters.Request())
+    serves = 0
+    while monitor.requests.served == served_before:
+        assert serves < 100
+        served.serve(time.monotonic_ns())
+        serves += 1
+        time.sleep(0.01)
+    executor.remove_node(monitor)
+    monitor.destroy_node()
     client.destroy_node()
 
 
