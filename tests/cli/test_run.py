@@ -297,7 +297,8 @@ def test_a_lathe_that_is_there_already_is_left_alone(
         )
         foreign.send_signal(signal.SIGINT)
         said = foreign.stderr.read()
-    assert done.returncode == 2, done.stdout + done.stderr
+    # On a busy machine DDS may tell of it only when the run has begun.
+    assert done.returncode in {1, 2}, done.stdout + done.stderr
     assert 'Another lathe is in this ROS domain: end it' in done.stderr
     assert 'depth_of_cut' not in said
 
