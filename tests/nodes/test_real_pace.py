@@ -42,6 +42,7 @@ def test_simulated_time_follows_the_clock_at_the_factor_asked_for(
         # What was given up counts from the start, and so may be more than belongs here.
         least, most = passed - given_up - CATCH_UP, passed + CATCH_UP
         assert (1.0 - TOLERANCE) * least <= cut <= (1.0 + TOLERANCE) * most
+        assert given_up < 9.0 * samples.ends[-1] / factor
         (times,) = samples.runs()
         assert contiguous(times)
 
