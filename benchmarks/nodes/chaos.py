@@ -226,7 +226,7 @@ def _regroup(nodes: Nodes, wait: Wait) -> None:
 class _Chatter:
     """Make the cut chatter, and once it is flagged end, kill or stop somebody."""
 
-    __name__ = 'disturbed while flagged'
+    __name__ = 'made to chatter'
 
     def __init__(self, listener: Ear, witness: Witness) -> None:
         """Find the lathe."""
@@ -242,7 +242,7 @@ class _Chatter:
                 self._set.call_async(request).add_done_callback(self._set.remove_pending_request)
             wait(1.0)
         if not self._witness.flag:
-            nodes.counts['not flagged in time'] += 1
+            nodes.counts['of these not flagged in time'] += 1
             return
         wait(nodes.chance.uniform(0.0, 5.0))
         nodes.chance.choice((_kill, _restart, _stop))(nodes, wait)

@@ -73,7 +73,7 @@ def faults_of(causes: int, names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @compiled(borrows=True, inner=True)
-def _meets_limit(channel: Any, value: float) -> bool:
+def _is_clipped(channel: Any, value: float) -> bool:
     """Whether a value that has come some times in a row is a limit of the range met once more."""
     smallest = max(channel.smallest_step, _ROUNDING * abs(value))
     fast = channel.entry_step >= _LIMIT_STEPS * smallest
@@ -144,7 +144,7 @@ def watch_channels(rows: Array, channels: Records) -> int:
             step = abs(value - channel.value)
             if step == 0.0:
                 channel.run += 1
-                if channel.run == _LIMIT_RUN and number > 0 and _meets_limit(channel, value):
+                if channel.run == _LIMIT_RUN and number > 0 and _is_clipped(channel, value):
                     channel.limit_at = time
                 long = time - channel.run_since > _STILL and channel.run > _STILL_SAMPLES
                 if number > 0:

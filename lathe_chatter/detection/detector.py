@@ -235,7 +235,7 @@ class ChatterDetector:
                 for band, adviser in zip(bands, self._advisers, strict=False)
             ]
             for k, judge in enumerate(self._judges):
-                judge.slower = self._judges[:k]
+                judge.slower_bands = self._judges[:k]
             listens = bool(bands) and (form.mixed or not form.angle)
             self._lines = None
             if listens:

@@ -47,7 +47,7 @@ _UNSUSPICIOUS = 0.5
 _LINE_TURNS, _LINE_TIMES = 600.0, (0.15, 1.0)
 """Radians of a vibration, and the s that these are at least and at most, over which its power is
 averaged to tell whether it is steady."""
-_FLANK = 4.0
+_LEAKAGE = 4.0
 """Times what reaches a resonator of slower vibration, beyond its flank, that it must hear to hear
 something of its own."""
 _LOOKS = 2000.0
@@ -95,7 +95,7 @@ class BandDetector:
         centres: Of the resonators, Hz (bins,).
         line_weights: From their energy to that of the signal in them (bins,).
         overlap: Resonators that hear one tone.
-        slower: Judges of slower bands, which have heard a block before this one does.
+        slower_bands: Judges of these, which have heard a block before this one does.
         correction: Natural frequency of the tool, Hz, and its standard error, where it is so sure
             that it should take the place of the told one.
     """
@@ -160,7 +160,7 @@ class BandDetector:
         self.fit = MachineFit(machine or _PAPER)
         self.adviser = adviser
         self.margin = math.nan, math.nan
-        self.slower: Sequence[BandDetector] = ()
+        self.slower_bands: Sequence[BandDetector] = ()
         self.correction: tuple[float, float] | None = None
         self._noise, self._total = record(NOISE_SUMS), record(HOP_SUMS)
         poles = self._kernels.poles
@@ -261,7 +261,7 @@ class BandDetector:
                 self._weigh_machine()
                 self.margin = self._new_margin()
             raised = now['alarmed'] and not now.since_alarm and not now.by_line
-            if raised and self._hears_slower((count - done) * self.period):
+            if raised and self._is_leakage((count - done) * self.period):
                 now.alarmed = now.saturated = 0
                 now.state = UNKNOWN
             if not now['alarmed']:
@@ -272,8 +272,8 @@ class BandDetector:
                 self.adviser.doubt(float(now.growth), float(now.growth_error), since)
         self._rest = block[count * self.hop :]
 
-    def _hears_slower(self, left: float) -> bool:
-        """Whether an alarm is no more than what comes through from slower vibration.
+    def _is_leakage(self, left: float) -> bool:
+        """Whether an alarm is of no more than what leaks into its band from slower vibration.
 
         A slow mode swells and fades in times that a quick band's baseline is too short to know.
 
@@ -284,15 +284,15 @@ class BandDetector:
         size = np.abs(state.motion[self._now.newest])
         usual = np.where(state.baseline > 0.0, state.baseline, 1.0)
         place = int(np.argmax(size**2 / usual))
-        pole, leaks = self._kernels.poles[place], 0.0
-        for judge in self.slower:
+        pole, leakage = self._kernels.poles[place], 0.0
+        for judge in self.slower_bands:
             ago = min(round(left / judge.period), HOPS - 1)
             heard = np.abs(judge.state.motion[judge.state.now[0].newest - ago]) ** 2
             heard = heard * judge.line_weights
             turn = np.exp(2j * math.pi * judge.centres[heard.argmax()] / self._thinned)
-            flanks = 1.0 / abs(1.0 - pole * turn) + 1.0 / abs(1.0 - pole / turn)
-            leaks = max(leaks, flanks * math.sqrt(float(heard.sum()) / judge.overlap))
-        return bool(size[place] < _FLANK * leaks)
+            responses = 1.0 / abs(1.0 - pole * turn) + 1.0 / abs(1.0 - pole / turn)
+            leakage = max(leakage, responses * math.sqrt(float(heard.sum()) / judge.overlap))
+        return bool(size[place] < _LEAKAGE * leakage)
 
     def _new_margin(self) -> tuple[float, float]:
         cutting, error = self.fit.cutting()

@@ -14,6 +14,8 @@ from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.real_time_loop import SECOND, Pacer, RequestLoad
 from lathe_chatter.nodes.simulation_control import RunControl, RunState
 
+GUARD_ON = 'not tripped'
+"""What is said of the guard as long as it has not ended the cut."""
 _MICRO = 1e-3
 """us in a ns."""
 _LATEST = 4096
@@ -191,7 +193,7 @@ class TickStatistics:
             'bearing contact': cut.bearing_contact.value,
             'bearing engaged, fraction of ticks': self._engaged / ticks,
             'tool in cut, fraction of ticks': self._in_cut / ticks,
-            'guard': control.ended_because or 'not tripped',
+            'guard': control.ended_because or GUARD_ON,
             'spindle speed, rev/min': self._speed if math.isfinite(self._speed) else asked,
             'spindle speed asked for, rev/min': asked,
             'depth of cut, m': cut.depth_of_cut,

@@ -98,7 +98,7 @@ class MonitorNode(ParameterNode):
         self._senders, self._silent = list[str](), False  # several senders: nothing is judged
         self._heard_at = self._leapt_at = self._newest = self._next_report = -math.inf
         self._figures, self._details = dict[str, float](), dict[str, object]()
-        self._reported_at = self._report_at = -math.inf
+        self._heard_by_report = self._reported_at = -math.inf
         self._reported_lost, self._was_silent = 0, True
 
         self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
@@ -345,9 +345,9 @@ class MonitorNode(ParameterNode):
             self._asked.ask()
         now = time.monotonic()
         # A timer that is late fires again soon; and what came while this node stood still waits.
-        is_second = _SECOND[0] < now - self._report_at < _SECOND[1]
-        silent = self._heard_at == self._reported_at and (is_second or self._was_silent)
-        self._report_at, self._was_silent = now, silent
+        is_second = _SECOND[0] < now - self._reported_at < _SECOND[1]
+        silent = self._heard_at == self._heard_by_report and (is_second or self._was_silent)
+        self._reported_at, self._was_silent = now, silent
         if silent and self._senders:
             self._senders, self._continuity.last = [], None
         elif silent and not self._silent and self._continuity.last is not None:
@@ -358,7 +358,7 @@ class MonitorNode(ParameterNode):
             self._silent = False
             self._subscription.remember_publishers()
         self._diagnostics.publish(self._statuses(silent=silent))
-        self._reported_at, self._reported_lost = self._heard_at, self._continuity.lost
+        self._heard_by_report, self._reported_lost = self._heard_at, self._continuity.lost
 
     def _statuses(self, *, silent: bool = False) -> list[Status]:
         since = {'flag since, s': self._flag_since} if math.isfinite(self._flag_since) else {}

@@ -19,6 +19,7 @@ from lathe_chatter.detection.estimate import FIGURES, RECOMMENDED_SPEED
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.model.lathe_parameter_table import CUT_ROWS, LATHE
 from lathe_chatter.nodes.diagnostics import DiagnosticsListener
+from lathe_chatter.nodes.lathe_diagnostics import GUARD_ON
 from lathe_chatter.nodes.operator_page_clients import CellClients
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.sample_receiver import join_blocks
@@ -39,8 +40,6 @@ _SILENCE = 2.5
 """s without a word from a node, which speaks once a second, after which it is called silent."""
 _STALE = 1.0
 """Simulated s after which a figure that does not come again is not known any more."""
-_ON = 'not tripped'
-"""What a lathe says of its guard as long as that has not ended the cut."""
 _CLOSEUP_PERIOD, _LOOK_PERIOD = 0.25, 0.5
 _SHOWN_SENTENCES = 80
 _WAITS = {
@@ -264,7 +263,10 @@ class OperatedCell:
             case 'back':
                 said = await self._go_back()
             case 'knock':
-                if self._heard.values(self._names['lathe'], 'cut').get('guard', _ON) != _ON:
+                if (
+                    self._heard.values(self._names['lathe'], 'cut').get('guard', GUARD_ON)
+                    != GUARD_ON
+                ):
                     raise LatheChatterError('The cut has ended: nothing was hit.')
                 # One that was killed is on its topic for long still, and nothing answers for it.
                 self.clients.knock(wish['impulse'], there=self._is_alive('lathe'))

@@ -33,7 +33,6 @@ SAID = {
         'when chatter is flagged': ('the next step waits for the flag to rise', WAITS),
         'when the flag is cleared': ('the next step waits for the flag to fall', WAITS),
         'when the supervisor asks': ('the next step waits for an offer', WAITS),
-        'not tripped': ('so a lathe says, whose guard has not ended the cut', KNOCK),
         'The cut has ended: nothing was hit.': (
             'the lathe has said that its guard has ended the cut, and of no reset since',
             KNOCK,

@@ -104,6 +104,24 @@ def test_where_ticks_leave_no_time_requests_have_as_much_as_the_ticks(lathe: Lat
         executor.shutdown()
 
 
+def until_connected(served: Served, *connected: Any) -> None:
+    end = time.monotonic() + PATIENCE
+    while not all(each() for each in connected):
+        assert time.monotonic() < end
+        served.serve(time.monotonic_ns())
+
+
+def serves_until(served: Served, done: Any) -> int:
+    """How often a loop has served when something is done; it fails beyond 200 times."""
+    serves = 0
+    while not done():
+        assert serves < 200
+        served.serve(time.monotonic_ns())
+        serves += 1
+        time.sleep(0.01)
+    return serves
+
+
 def test_what_a_flood_has_left_holds_up_nobody(lathe: LatheNode, context: Context) -> None:
     """The executor takes each request, and has it served behind all that came meanwhile."""
     client = Node('client', context=context)
@@ -112,10 +130,7 @@ def test_what_a_flood_has_left_holds_up_nobody(lathe: LatheNode, context: Contex
     executor = make_executor(lathe)
     executor.add_node(lathe)
     served = Served(executor, lathe)
-    end = time.monotonic() + PATIENCE
-    while not (asked.service_is_ready() and floods.service_is_ready()):
-        assert time.monotonic() < end
-        served.serve(time.monotonic_ns())
+    until_connected(served, asked.service_is_ready, floods.service_is_ready)
     request = SetParameters.Request(parameters=messages_of({'depth_of_cut': 0.0004}))
     for _ in range(300):
         for _ in range(10):
@@ -123,13 +138,12 @@ def test_what_a_flood_has_left_holds_up_nobody(lathe: LatheNode, context: Contex
         time.sleep(0.002)
         served.serve(time.monotonic_ns())
     asked.call_async(SetBool.Request(data=True))
-    serves = 0
-    while lathe.run_state is RunState.RUNNING:
-        assert serves < 200
+
+    def has_paused() -> bool:
         served.spent = int(SECOND)  # what ticks took meanwhile
-        served.serve(time.monotonic_ns())
-        serves += 1
-        time.sleep(0.01)
+        return lathe.run_state is not RunState.RUNNING
+
+    serves_until(served, has_paused)
     executor.remove_node(lathe)
     client.destroy_node()
 
@@ -143,23 +157,15 @@ def test_what_others_tell_holds_up_nobody_either(context: Context) -> None:
     executor = make_executor(monitor)
     executor.add_node(monitor)
     served = Served(executor, monitor)
-    end = time.monotonic() + PATIENCE
-    while not (asked.service_is_ready() and tells.get_subscription_count()):
-        assert time.monotonic() < end
-        served.serve(time.monotonic_ns())
+    until_connected(served, asked.service_is_ready, tells.get_subscription_count)
     for _ in range(300):
         for _ in range(10):
             tells.publish(ParameterEvent(node='/another'))
         served.serve(time.monotonic_ns())
         time.sleep(0.01)
-    served_before = monitor.requests.served
+    before = monitor.requests.served
     asked.call_async(ListParameters.Request())
-    serves = 0
-    while monitor.requests.served == served_before:
-        assert serves < 100
-        served.serve(time.monotonic_ns())
-        serves += 1
-        time.sleep(0.01)
+    assert serves_until(served, lambda: monitor.requests.served > before) < 100
     executor.remove_node(monitor)
     monitor.destroy_node()
     client.destroy_node()

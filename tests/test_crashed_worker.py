@@ -15,9 +15,8 @@ def test_quick(n):
     pass
 """
 CRASHING = """
-import os, time
+import os
 def test_that_crashes_once():
-    time.sleep(0.5)
     try:
         os.mkdir('crashed')
     except FileExistsError:
@@ -27,9 +26,10 @@ def test_behind_it():
     pass
 """
 LONG = """
-import time
-def test_long():
-    time.sleep(4)
+import os, time
+def test_that_outlasts_the_crash():
+    while not os.path.exists('crashed'):
+        time.sleep(0.05)
 """
 
 
