@@ -29,8 +29,8 @@ ALWAYS = ('chatter_supervisor', 'operator_page')
 PATIENCE = 60.0
 FLAG_PATIENCE = 15.0
 """s that chatter has to be flagged, on a machine that is busy."""
-_DEEP = {'depth_of_cut': 0.001, 'bearing_contact': 'none'}
-"""What chatters at every speed that a lathe is started with."""
+_DEEP = {'depth_of_cut': 0.001, 'bearing_contact': 'none', 'spindle_speed_rpm': 3000.0}
+"""What chatters; at the speed to which a supervisor has gone it may be stable."""
 
 
 class Nodes:
