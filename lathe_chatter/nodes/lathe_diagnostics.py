@@ -147,6 +147,7 @@ class TickStatistics:
         p50, p99, largest = (q * _MICRO for q in self._steps.quantiles(0.5, 0.99, 1.0))
         late99, latest = (q * _MICRO for q in self.lateness.quantiles(0.99, 1.0))
         values = {
+            'state': control.state.value,
             'real-time factor': reached,
             'real-time factor asked for': asked,
             'ticks': self.ticks,

@@ -80,6 +80,7 @@ class OperatedCell:
         self._tasks: set[asyncio.Task[Any]] = set()
         self._closeup: tuple[float, Any, Any] = (math.nan, {}, {})
         self._closeup_at = self._look_at = 0.0
+        self._listens_since = time.monotonic()
         monitor, supervisor = self._names['monitor'], self._names['supervisor']
         put = self.board.put
         self._samples = PolledSubscription(node, Float64MultiArray, self._samples_name, _LOSSY)
@@ -132,8 +133,10 @@ class OperatedCell:
             self._play()
         now = time.monotonic()
         if now >= self._look_at:
+            if 0.0 < self._look_at < now - _LOOK_PERIOD:  # it stood still itself
+                self._listens_since = now
             self._look_at = now + _LOOK_PERIOD
-            self._look()
+            self._look(now - self._listens_since)
 
     def _take_samples(self) -> None:
         blocks: list[Any] = []
@@ -184,10 +187,16 @@ class OperatedCell:
     def _is_alive(self, who: str) -> bool:
         return self._heard.silence(self._names[who]) < _SILENCE
 
-    def _look(self) -> None:
-        """Who is there, what they say, and what the chart is of."""
-        alive = {who: self._is_alive(who) for who in self._names}
-        alive['samples'] = self._heard.silence(self._samples_name) < 1.0
+    def _look(self, listened: float) -> None:
+        """Who is there, what they say, and what the chart is of.
+
+        Nobody is silent before he was listened to for so long, s.
+        """
+        alive = {who: listened < _SILENCE or self._is_alive(who) for who in self._names}
+        told = self.clients.values.get('lathe', {})
+        ticks = told.get('tick_rate', 500.0) * (told.get('real_time_factor') or 1.0)
+        silence = min(listened, self._heard.silence(self._samples_name))
+        alive['samples'] = silence < 1.0 + 2.0 / ticks
         self.board.put('alive', alive)
         statuses = self._heard.statuses
         self.board.put('statuses', {who: statuses.get(n, {}) for who, n in self._names.items()})

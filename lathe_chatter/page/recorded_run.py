@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
-from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.page.live_signals import SIGNALS, closeup
 from lathe_chatter.page.server import Viewer
 from lathe_chatter.page.stability_chart import draw_chart, fits
@@ -213,13 +213,16 @@ class RecordedRun:
 
     async def look(self, viewer: Viewer, wish: Mapping[str, Any]) -> bool:
         """Show a part of the run, or a moment."""
-        if wish['do'] == 'view':
-            begin, end = float(wish['from']), float(wish['to'])
-            picture = await asyncio.to_thread(self._view, begin, end, str(wish['plot'])[:20])
-        elif wish['do'] == 'at':
-            picture = await asyncio.to_thread(self._moment, float(wish['time']))
-        else:
-            return bool(wish['do'] == 'choose')
+        try:
+            if wish['do'] == 'view':
+                begin, end = float(wish['from']), float(wish['to'])
+                picture = await asyncio.to_thread(self._view, begin, end, str(wish['plot'])[:20])
+            elif wish['do'] == 'at':
+                picture = await asyncio.to_thread(self._moment, float(wish['time']))
+            else:
+                return bool(wish['do'] == 'choose')
+        except OSError as error:
+            raise LatheChatterError(f'{self._path} cannot be read: {reason_of(error)}.') from None
         viewer.cursors.setdefault('pictures', []).append(picture)
         return True
 
@@ -257,14 +260,15 @@ class RecordedRun:
             figures['depth'] = cut.depth_of_cut
             figures['speed'] = figures.get('speed') or cut.spindle_speed_rpm
             before = [flag for flag in history.flags if flag.time <= time]
-            cell['flag'] = {'up': False, 'since': None}
-            if before:
-                cell['flag'] = {'up': before[-1].chatter, 'since': before[-1].time}
             cell['figures'] = {
                 name: value_near(series, time)
                 for name, series in history.estimates.items()
                 if np.any(np.abs(series[0] - time) < 1.0)
             }
+            # No figure about then: no monitor was there, or it heard nothing.
+            cell['flag'] = {'up': False, 'since': None} if cell['figures'] else None
+            if before and cell['figures']:
+                cell['flag'] = {'up': before[-1].chatter, 'since': before[-1].time}
             recommended = cell['figures'].get('recommended_speed_rpm')
             cell['chart'] = self._chart(history, time, recommended)
         return {'closeup': figures, 'cell': cell, 'moment': time}, arrays

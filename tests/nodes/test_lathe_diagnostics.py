@@ -39,9 +39,11 @@ class Cut:
         return self.statistics.cutting(self.control, self.lathe).message
 
     def pace(self, asked: float = 1.0, late: float = 0.0, clock: str = '') -> str:
-        return self.statistics.pace(
+        status = self.statistics.pace(
             self.control, asked=asked, late=late, clock=clock, scheduling=''
-        ).message
+        )
+        assert status.values['state'] == self.control.state.value
+        return status.message
 
 
 def test_the_verdict_on_the_pace_says_what_is_wrong_first() -> None:

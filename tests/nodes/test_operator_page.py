@@ -348,7 +348,7 @@ def test_a_killed_page_is_told_and_is_back_by_itself(page: Page, browser: Browse
     said = 'document.querySelector("#notice").textContent'
     browser.until(f'{said}.includes("you are looking on")', 'that control is lost')
     begun = browser.run('document.querySelector("#log").lastElementChild.textContent')
-    assert re.fullmatch(r'This page began at \d\d:\d\d:\d\d: what happened before .*', begun)
+    assert re.fullmatch(r'This page began at \d\d:\d\d:\d\d and lists the newest: .*', begun)
     browser.until(f'{LAMP} === "stable"', 'the lamp', PATIENCE)
 
 

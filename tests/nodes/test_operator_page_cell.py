@@ -207,6 +207,20 @@ def test_the_cut_of_before_is_set_once_and_only_where_there_is_one(lathe: Any, d
     assert desk.act(do='back') == none
 
 
+def test_a_lathe_of_few_ticks_is_not_said_to_send_nothing(start: Start, desk: Desk) -> None:
+    start(LatheNode, tick_rate=1.0, real_time_factor=0.5)
+    desk.knows_the_lathe()
+    desk.until(lambda: desk.cell.board.get('alive')['samples'], 'samples')
+    seen: set[bool] = set()
+
+    def later() -> bool:
+        seen.add(desk.cell.board.get('alive')['samples'])
+        return bool(desk.cell._signals.time > 2.5)
+
+    desk.until(later, 'some ticks')
+    assert seen == {True}
+
+
 @pytest.mark.usefixtures('lathe')
 def test_a_scenario_for_another_machine_is_refused(desk: Desk) -> None:
     heavier = f'{TRIAL}parameters: {{tool.mass: 0.2}}\n'

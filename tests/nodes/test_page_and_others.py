@@ -61,6 +61,18 @@ def test_who_holds_no_token_looks_and_does_not_act(page: Page, browser: Browser)
         assert answer_to(stranger, do='operate')['ok']
 
 
+def test_the_page_says_who_has_no_token(page: Page) -> None:
+    stranger = Browser(page.folder / 'profile of a stranger')
+    try:
+        stranger.open(page.url())
+        said = 'document.querySelector("#viewers").textContent'
+        told = 'without the token: you may look, and not act.'
+        stranger.until(f'{said}.endsWith("{told}")', 'that it may not act')
+        assert stranger.run('document.querySelector("#operate").disabled')
+    finally:
+        stranger.close()
+
+
 def test_the_supervisor_asks_in_the_page_and_is_answered_there(browser: Browser) -> None:
     operate(browser)
     browser.until('document.querySelector("#mode").value === "ask"', 'its mode', PATIENCE)

@@ -209,7 +209,7 @@ def test_a_killed_recorder_records_nothing(page: Page, browser: Browser) -> None
     said = 'document.querySelector("#recording").textContent'
     browser.until(f'{said}.startsWith("recording")', 'the recording', PATIENCE)
     page.kill('run_recorder')
-    browser.until(f'{said} === "No recorder is there."', 'that it is gone', PATIENCE)
+    browser.until(f'{said} === "No recorder speaks."', 'that it is gone', PATIENCE)
 
 
 def test_a_field_that_has_the_focus_follows_a_lathe_that_begins_anew(

@@ -76,6 +76,10 @@ SAID = {
             UNREAD,
         ),
         '{}: {}': ('a file, and what of it cannot be read', UNREAD),
+        '{} cannot be read: {}.': (
+            'the system refuses what is to be shown closely, for that reason',
+            'page/test_recorded_page.py::test_it_claims_nothing_of_what_is_not_in_the_record',
+        ),
         'Not all can be read: {}.': (
             'these parts are damaged or missing; all others are shown',
             UNREAD,

@@ -171,16 +171,20 @@ function drawPortrait(id, body, line, points) {
     }
     ctx.restore();
   });
-  describe(id, `Phase portrait of the ${body}: ${near(Math.min(...x))} to ${near(Math.max(...x))} µm, ${points.length / 2} turns`);
+  describe(id, `Phase portrait of the ${body}: ${near(Math.min(...x))} to ${near(Math.max(...x))} µm${points.length ? `, ${points.length / 2} turns` : ''}`);
 }
 
 // What was drawn of a cut that has begun anew, and of which nothing has come yet.
 function wipePlots() {
-  for (const [id, u] of plots) {
-    if (id === 'chart') continue;
-    Object.assign(u, {hand: () => {}, turn: null, chatter: null});
-    u.setData(u.data.map(() => []));
-  }
+  for (const id of plots.keys()) if (id !== 'chart') wipe(id);
+}
+
+function wipe(id) {
+  const u = plots.get(id);
+  if (!u) return;
+  Object.assign(u, {hand: () => {}, turn: null, chatter: null, described: null});
+  u.setData(u.data.map(() => []));
+  describe(id, 'Nothing has come to be shown here.');
 }
 
 function clip(u) {

@@ -2,7 +2,7 @@
 'use strict';
 
 const $ = id => document.getElementById(id);
-const COUNT = 1000, WINDOWS = [2, 60];
+const COUNT = 1000, WINDOWS = [2, 60], PATIENCE = 3000, NO_ANSWER = 'The server of this page does not answer.';
 // Units of the shop floor: of a parameter by name, else by its SI unit; and where a slider ends.
 const SHOP = {
   spindle_speed_rpm: ['rev/min', 1, 12000], depth_of_cut: ['mm', 1e3, 2], bearing_clearance: ['µm', 1e6, 20],
@@ -14,6 +14,8 @@ const SHOP = {
 const PRIMARY = ['spindle_speed_rpm', 'depth_of_cut', 'bearing_clearance', 'bearing_contact', 'feed_speed', 'feed_per_revolution'];
 
 let socket = null, retries = 0, asked = 0, frames = 0;
+// Why nothing comes from the server, in words; and when the frame that was asked for is overdue.
+let unanswered = '', overdue = Infinity;
 const waiting = new Map();
 let cell, page, server, trail, signals, envelopes, recommended, recorded = false, figuresDue = false, operated = false;
 
@@ -56,11 +58,13 @@ function connect() {
     retries = 0;
     const token = sessionStorage.getItem('token');
     if (token) ask({do: 'token', token}).then(answer => { if (!answer.ok) notify(answer); });
-    if (operated) notify({ok: false, text: 'The connection was lost: you are looking on. Press Operate to go on.'});
+    if (operated) notify({ok: false, text: 'The connection was lost: you are looking on.'});
     operated = false;
     wish({do: 'next'});
   };
   socket.onmessage = message => {
+    overdue = Infinity;
+    if (unanswered) tell('');
     const length = new DataView(message.data).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message.data, 4, length)));
     const arrays = {};
@@ -75,21 +79,32 @@ function connect() {
   };
   socket.onclose = event => {
     const wait = Math.min(5, 0.5 * 2 ** retries++);
-    $('gone').textContent = `${event.reason || 'The server of this page does not answer.'} What you see is old. Trying again (${retries}) ...`;
-    $('gone').hidden = false;
-    showLamp();
-    showStatuses();
+    overdue = Infinity;
+    tell(`${event.reason || NO_ANSWER} What you see is old. Trying again (${retries}) ...`);
     setTimeout(connect, wait * 1000);
   };
 }
 
+// Whether the server answers, and all that holds only while it does.
+function tell(why) {
+  unanswered = why;
+  takeServer({});
+  showQuestion();
+  showAlive();
+}
+
+// A server that stands still closes nothing.
+setInterval(() => { if (!unanswered && performance.now() > overdue) tell(`${NO_ANSWER} What you see is old.`); }, 500);
+
 function wish(message) {
-  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+  if (socket.readyState !== WebSocket.OPEN) return;
+  if (message.do === 'next') overdue = performance.now() + PATIENCE;
+  socket.send(JSON.stringify(message));
 }
 
 function ask(message) {
   return new Promise(done => {
-    if (socket.readyState !== WebSocket.OPEN) return done({ok: false, text: 'The server of this page is gone.'});
+    if (socket.readyState !== WebSocket.OPEN) return done({ok: false, text: NO_ANSWER});
     waiting.set(++asked, done);
     wish({...message, id: asked});
   });
@@ -133,7 +148,7 @@ function takePage(news) {
     $('lathes').replaceChildren(...news.lathes.map(name => new Option(name)));
     if (news.lathes.includes(before)) $('lathes').value = before;
     if (news.lathes.length && (!cell.name || cell.name !== $('lathes').value)) choose();
-    else if (!news.lathes.length) showGone('No lathe is there yet. The page waits for one.');
+    else if (!news.lathes.length) showAlive();
   }
   if (recorded) takeRun(news);
   if ('other_pages' in news) takeServer({});
@@ -150,7 +165,8 @@ function choose() {
   makeSupervisor(null);
   showLog();
   showQuestion();
-  for (const id of ['scenario-text', 'recording', 'health', 'chart-text']) $(id).textContent = '';
+  showScenario({text: ''});
+  for (const id of ['recording', 'health', 'chart-text']) $(id).textContent = '';
   sessionStorage.setItem('lathe', $('lathes').value);
   act({do: 'choose', lathe: $('lathes').value});
 }
@@ -160,21 +176,22 @@ function takeServer(news) {
   const free = !server.operator;
   $('operate').textContent = server.operating ? 'Look on' : free ? 'Operate' : 'Take over';
   $('operate').setAttribute('aria-pressed', String(server.operating));
-  $('operate').disabled = !server.trusted;
+  $('operate').disabled = !server.trusted || !!unanswered;
   document.body.classList.toggle('looking-on', !server.operating);
-  if (recorded || !('viewers' in server)) return;
-  const others = page.other_pages > 0 ? ' Another operator page serves this ROS domain too: who operates there is not known here.' : '';
+  lock();
+  if (unanswered || !('viewers' in server)) return void ($('viewers').textContent = '');
+  if (recorded) return;
+  const others = page.other_pages > 0 ? ' Another operator page serves this ROS domain too, or did so until just now: who operates there is not known here.' : '';
   const who = server.operating ? 'you operate' : free ? 'nobody operates' : `${server.operator} operates`;
   $('viewers').textContent = `${server.viewers} ${server.viewers === 1 ? 'viewer' : 'viewers'}, ${who}. You are ${server.you}${server.trusted ? '' : ', without the token: you may look, and not act'}.${others}`;
-  lock();
 }
 
 // What may be pressed now, and what not.
 function lock() {
   if (recorded) return;
-  const mine = server.operating && socket.readyState === WebSocket.OPEN;
+  const mine = server.operating && !unanswered;
   document.querySelectorAll('.act').forEach(each => { each.disabled = !mine; });
-  recommended = stale() ? null : cell.figures?.recommended_speed_rpm;
+  recommended = heard() ? cell.figures?.recommended_speed_rpm : null;
   $('snapshot').disabled ||= !!cell.statuses?.recorder?.recording?.values?.run;
   $('take-recommended').disabled = !mine || !recommended;
   $('take-recommended').textContent = recommended ? `Set ${Math.round(recommended)} rev/min` : 'No speed is recommended';
@@ -193,65 +210,83 @@ function takeCell(news) {
 }
 
 function showQuestion() {
-  $('action').textContent = plainly(cell.action ?? '');
+  // Without an offer that still stands, only what the supervisor would do.
+  $('action').textContent = plainly(cell.action ?? '').replace(cell.asked ? '' : ': press Accept', '');
   $('question-text').textContent = cell.asked ? `The supervisor asks. ${$('action').textContent}` : '';
-  $('question').hidden = !cell.asked;
+  $('question').hidden = !cell.asked || !!unanswered;
 }
 
-function showGone(text) {
-  $('gone').textContent = text;
-  $('gone').hidden = !text;
-}
+// Of the run, as the lathe tells it: running, paused or ended.
+const state = () => cell.statuses?.lathe?.pace?.values?.state;
 
 // Why what is seen holds no more, in words; none where it holds.
 function stale() {
   if (recorded) return '';
-  if (socket.readyState !== WebSocket.OPEN) return 'What you see is old.';
-  const {lathe, samples} = cell.alive ?? {samples: true}, run = cell.statuses?.lathe?.pace?.message;
-  if (samples || (lathe && run === 'paused')) return '';
-  return lathe && run === 'ended' ? 'The cut has ended.' : 'What you see is old.';
+  if (unanswered) return 'What you see is old.';
+  const {lathe, samples} = cell.alive ?? {samples: true};
+  if (samples || (lathe && state() === 'paused')) return '';
+  return lathe && state() === 'ended' ? 'The cut has ended.' : 'What you see is old.';
+}
+
+// Whether the monitor speaks, and of what is seen.
+const heard = () => !stale() && (recorded || !!cell.alive?.monitor);
+
+// What is amiss with the cell, in words.
+function amiss() {
+  if (recorded) return '';
+  if (!cell.alive) return page.lathes?.length === 0 ? 'No lathe has been found. The page waits for one.' : '';
+  const {lathe, monitor, recorder, samples} = cell.alive;
+  const run = state(), {pace} = cell.statuses?.lathe ?? {}, words = [];
+  if (!lathe && !samples) words.push(`${cell.name} is silent. What you see is old; the page goes on when it is back.`);
+  else if (!samples && !['paused', 'ended'].includes(run)) words.push(`No samples come from ${cell.name}${pace?.level ? `: ${pace.message}` : ''}.`);
+  else if (run === 'ended') words.push(`${cell.statuses.lathe.cut?.message ?? 'The cut has ended.'} Reset begins anew.`);
+  if (!monitor) words.push('The monitor is silent: nothing is known of chatter.');
+  if (!recorder) words.push('No recorder speaks.');
+  const told = cell.statuses?.monitor?.samples;
+  for (const text of [cell.complaint, monitor && told?.level > 1 && run !== 'paused' ? told.message : '']) if (text) words.push(text);
+  return plainly(words.join(' '));
 }
 
 function showAlive() {
-  const {lathe, monitor, recorder, samples} = cell.alive;
-  const run = cell.statuses?.lathe?.pace?.message;
-  const words = [];
-  if (!lathe && !samples) words.push(`${cell.name} is silent: ended, killed or out of reach. What you see is old; the page goes on when it is back.`);
-  else if (!samples && !['paused', 'ended'].includes(run)) words.push(`No samples come from ${cell.name}.`);
-  else if (run === 'ended') words.push(`${cell.statuses.lathe.cut?.message ?? 'The cut has ended.'} Reset begins anew.`);
-  if (!monitor) words.push('The monitor is silent: nothing is known of chatter.');
-  if (!recorder) words.push('No recorder is there.');
-  const heard = cell.statuses?.monitor?.samples;
-  for (const text of [cell.complaint, heard?.level > 1 && run !== 'paused' ? heard.message : '']) if (text) words.push(text);
-  showGone(plainly(words.join(' ')));
+  $('gone').textContent = unanswered || amiss();
+  $('gone').hidden = !$('gone').textContent;
   showLamp();
   showStatuses();
 }
 
-function showLamp() {
-  const {flag, state, alive} = cell, now = recorded ? Infinity : signals?.time;
-  const told = cell.statuses?.monitor?.cut?.values ?? {}, same = told.flag === (flag?.up ? 'True' : 'False');
-  const at = flag?.since ?? (same ? told['flag since, s'] : null);
+// Since when the flag is as it is, s, where that is told.
+function flagSince() {
+  const told = cell.statuses?.monitor?.cut?.values ?? {}, same = told.flag === (cell.flag?.up ? 'True' : 'False');
+  return cell.flag?.since ?? (same ? told['flag since, s'] : null);
+}
+
+// Whether chatter is flagged in what is seen; null where that is not known.
+function flagged() {
+  const now = recorded ? Infinity : signals?.time, up = cell.flag?.up;
   // Not of a run before this one: nothing was cut in this, or the flag is of a time to come.
-  const other = signals && (now == null || (flag?.up && at > now + 0.5));
-  const known = flag && !other && !stale() && (recorded || alive?.monitor);
-  $('lamp').className = `lamp ${known ? (flag.up ? 'up' : state === 'unknown' ? '' : 'down') : ''}`;
-  const word = !known ? (run.reading ? 'reading' : 'unknown') : flag.up ? 'CHATTER' : state ?? 'no chatter';
+  const other = signals && (now == null || (up && flagSince() > now + 0.5));
+  return cell.flag && !other && heard() ? up : null;
+}
+
+function showLamp() {
+  const up = flagged(), at = flagSince();
+  $('lamp').className = `lamp ${up ? 'up' : up == null || cell.state === 'unknown' ? '' : 'down'}`;
+  const word = up == null ? (run.reading ? 'reading' : 'unknown') : up ? 'CHATTER' : cell.state ?? 'no chatter';
   if ($('lamp-word').textContent !== word) $('lamp-word').textContent = word;
-  const since = known && flag.up && at != null ? `since ${Number(at).toFixed(2)} s` : '';
+  const since = up && at != null ? `since ${Number(at).toFixed(2)} s` : '';
   if ($('lamp-since').textContent !== since) $('lamp-since').textContent = since;
 }
 
 function showFigures() {
   figuresDue = false;
-  const f = (!stale() && cell.figures) || {}, cut = cell.statuses?.monitor?.cut?.values ?? {};
+  const f = (heard() && cell.figures) || {}, cut = cell.statuses?.monitor?.cut?.values ?? {};
   const error = key => (cut[key] == null || isNaN(cut[key]) ? '' : ` ± ${number(Number(cut[key]), 2)}`);
   const margin = cut['standard error of the margin'];
   const texts = {
     growth_rate: f.growth_rate == null ? '–' : `${number(f.growth_rate)}${error('standard error of the growth rate, 1/s')} /s`,
     frequency: f.frequency == null ? '–' : `${f.frequency.toFixed(1)} Hz`,
     amplitude: f.amplitude == null ? '–' : `${f.amplitude < 1e-9 ? '< 0.001' : number(f.amplitude * MICRO)} µm`,
-    margin: f.margin == null || cell.flag?.up ? '–' : `${(f.margin * 100).toFixed(0)}${margin == null || isNaN(margin) ? '' : ` ± ${(margin * 100).toFixed(0)}`} %`,
+    margin: f.margin == null || flagged() !== false ? '–' : `${(f.margin * 100).toFixed(0)}${margin == null || isNaN(margin) ? '' : ` ± ${(margin * 100).toFixed(0)}`} %`,
     recommended: f.recommended_speed_rpm == null ? '–' : `${Math.round(f.recommended_speed_rpm)} rev/min`,
   };
   for (const [id, text] of Object.entries(texts)) if ($(id).textContent !== text) $(id).textContent = text;
@@ -260,7 +295,7 @@ function showFigures() {
 
 function showStatuses() {
   const {lathe, monitor, recorder} = cell.statuses ?? {}, pace = lathe?.pace, v = pace?.values ?? {};
-  const paused = pace?.message === 'paused';
+  const paused = state() === 'paused';
   const button = document.querySelector('[data-call=pause], [data-call=resume]');
   button.dataset.call = paused ? 'resume' : 'pause';
   button.textContent = paused ? 'Go on' : 'Pause';
@@ -271,8 +306,8 @@ function showStatuses() {
   ].filter(([count]) => count).map(([count, who]) => `${count} by ${who}`), old = stale();
   $('health').className = (pace?.level ?? 0) || lost.length ? 'bad' : '';
   $('health').textContent = old ? `${old}${lost.length ? ` Lost: ${lost.join(', ')}.` : ''}` : pace ? `${pace.message}: ${number(Number(v['real-time factor']))} × real time, late by ${number(Number(v['lateness p99, us']) / 1e3)} ms (p99), ${number(Number(v['lag given up, s']))} s given up. Lost: ${lost.join(', ') || 'nothing'}.` : '';
-  const recording = recorder?.recording, answers = socket.readyState === WebSocket.OPEN;
-  $('recording').textContent = !answers ? 'Not known while the server of this page does not answer.' : cell.alive?.recorder === false ? 'No recorder is there.' : recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
+  const recording = recorder?.recording;
+  $('recording').textContent = unanswered ? 'Not known while the server of this page does not answer.' : cell.alive?.recorder === false ? 'No recorder speaks.' : recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
   showFigures();
 }
 
@@ -286,7 +321,7 @@ function showLog() {
     return item;
   });
   const begun = document.createElement('li');
-  begun.textContent = `This page began at ${page.begun}: what happened before is in the record, where one was kept.`;
+  begun.textContent = `This page began at ${page.begun} and lists the newest: what is older is in the record, where one was kept.`;
   $('log').replaceChildren(...items, begun);
 }
 
@@ -333,7 +368,7 @@ function takeSignals(news, arrays) {
 }
 
 function showClock() {
-  const pause = cell.statuses?.lathe?.pace?.message === 'paused' && !stale() ? ', paused' : '';
+  const pause = state() === 'paused' && !stale() ? ', paused' : '';
   if (signals) $('clock').textContent = `${(signals.time ?? 0).toFixed(1)} s${pause}`;
 }
 
@@ -344,11 +379,13 @@ function drawEnvelope(k, height = k ? 130 : 170, onSelect = null) {
 }
 
 function takeCloseup(figures, arrays) {
-  const chatter = cell.flag?.up ? cell.figures?.frequency ?? figures.chatter : null;
+  const chatter = flagged() ? cell.figures?.frequency : null;
   for (const body of ['tool', 'workpiece']) {
     if (arrays[`${body}_portrait`]) drawPortrait(`${body}-portrait`, body, arrays[`${body}_portrait`], arrays[`${body}_turns`] ?? []);
+    else wipe(`${body}-portrait`);
   }
   if (arrays.spectrum) drawSpectrum(arrays.spectrum, figures.hertz, figures.speed, chatter, cell.figures?.frequency);
+  else wipe('spectrum');
   const depth = figures.depth ?? cell.lathe_values?.depth_of_cut;
   const speed = figures.speed ?? cell.lathe_values?.spindle_speed_rpm;
   if (depth == null) return;
@@ -367,7 +404,7 @@ function showChart() {
     $('chart-text').textContent = chart?.error ?? (cell.charting ? 'The chart is being computed ...' : '');
     return;
   }
-  drawChart(chart, point, trail, recommended, cell.flag?.up);
+  drawChart(chart, point, trail, recommended, flagged());
   const k = point ? chart.speed.findIndex(speed => speed >= point.speed) : -1;
   const share = k > 0 ? (point.speed - chart.speed[k - 1]) / (chart.speed[k] - chart.speed[k - 1]) : 1;
   const limit = name => {
@@ -536,7 +573,7 @@ $('operate').onclick = () => act(server.operating ? {do: 'release'} : {do: 'oper
 $('take-recommended').onclick = () => act({do: 'set', node: 'lathe', values: {spindle_speed_rpm: Math.round(recommended)}});
 $('knock').onclick = () => {
   const {value, why} = typed($('impulse').value);
-  const far = Math.abs(value) > 1000 ? `${number(value, 9)} mN s would end the cut: from here -1000 to 1000 mN s are allowed. Nothing was hit.` : why;
+  const far = Math.abs(value) > 1000 ? `${number(value, 9)} mN s: from here -1000 to 1000 mN s are allowed. Nothing was hit.` : why;
   if (far) notify({ok: false, text: `Knock: ${far.replace('changed', 'hit')}`});
   else act({do: 'knock', impulse: value / 1e3});
 };

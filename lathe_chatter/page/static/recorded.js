@@ -58,7 +58,8 @@ async function look(at, span = run.span) {
   run.busy = true;
   while (run.again) {
     run.again = false;
-    await Promise.all([view('part', run.at - run.span, run.at), ask({do: 'at', time: run.at})]);
+    const answers = await Promise.all([view('part', run.at - run.span, run.at), ask({do: 'at', time: run.at})]);
+    answers.filter(({ok}) => !ok).forEach(notify);
   }
   run.busy = false;
 }

@@ -1,0 +1,72 @@
+"""What the page of a recorded run says of what is not in it, in a real browser."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from support.browser import Browser, chromium
+
+from lathe_chatter.lathe.config import recorded_config
+from lathe_chatter.model.lathe_parameter_table import parameters_of
+from lathe_chatter.page.recorded_run import RecordedRun
+from lathe_chatter.page.server import PageServer
+from lathe_chatter.recording import LatheRun
+
+PATIENCE = 120.0
+GONE = 'document.querySelector("#gone")'
+
+
+@pytest.fixture
+def unheard(tmp_path: Path) -> Path:
+    """Eight seconds that no monitor heard, three of which are missing."""
+    lathe = recorded_config({}).lathe()
+    with LatheRun(tmp_path / 'run', parameters_of(lathe)) as written:
+        for k in range(80):
+            block = lathe.advance(1000)
+            if not 30 <= k < 60:
+                written.write(block)
+    return tmp_path / 'run'
+
+
+@contextmanager
+def served(path: Path, port: int = 0) -> Iterator[str]:
+    """The page of a run that is read, on a port."""
+    shown = RecordedRun(path)
+    asyncio.run(shown.read())
+    server = PageServer(shown, '127.0.0.1', port)
+    serving = threading.Thread(target=lambda: asyncio.run(server.run()))
+    serving.start()
+    try:
+        yield server.url
+    finally:
+        server.end()
+        serving.join(PATIENCE)
+
+
+@pytest.mark.skipif(chromium() is None, reason='no Chromium is here')
+def test_it_claims_nothing_of_what_is_not_in_the_record(unheard: Path, tmp_path: Path) -> None:
+    browser = Browser(tmp_path / 'profile')
+    drawn = '["tool-portrait", "spectrum"].map(id => plots.get(id)?.root.ariaLabel)'
+    try:
+        with served(unheard) as url:
+            browser.open(url)
+            browser.until(f'{drawn}.every(text => text?.includes("\\u00b5m"))', 'the last of it')
+            assert browser.text('#lamp-word') == 'unknown'
+            browser.run('look(5.5, 1)')
+            none = 'Nothing has come to be shown here.'
+            browser.until(f'{drawn}.every(text => text === "{none}")', 'that there is nothing')
+        browser.until(f'{GONE}.textContent.includes("does not answer")', 'that it is gone')
+        with served(unheard, int(url.split(':')[2].strip('/'))):
+            browser.until(f'{GONE}.hidden', 'that it is back', PATIENCE)
+            unheard.rename(tmp_path / 'elsewhere')
+            browser.run('look(2.5, 0.1)')
+            said = 'document.querySelector("#notice").textContent'
+            browser.until(f'{said}.includes("cannot be read: No such file")', 'that it is away')
+        assert browser.complaints == []
+    finally:
+        browser.close()
