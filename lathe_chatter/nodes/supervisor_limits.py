@@ -1,12 +1,22 @@
-"""Whether the limits of a supervisor suit the machine that it meets."""
+"""The limits of a supervisor, and whether they suit the machine that it meets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from lathe_chatter.model import Cut
 from lathe_chatter.model.quantity_fields import limits_of
 from lathe_chatter.supervisor import Limits
+
+
+def limits_from(values: Mapping[str, Any]) -> Limits:
+    """The limits among parameters.
+
+    Raises:
+        ParameterError: If they contradict each other.
+    """
+    return Limits(**{name: values[name] for name in Limits.__dataclass_fields__})
 
 
 def unsuited(limits: Limits, cut: Cut, spindle: tuple[float, float] | None) -> Iterator[str]:

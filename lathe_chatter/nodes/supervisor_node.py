@@ -32,6 +32,7 @@ from lathe_chatter.model.lathe_parameter_table import (
 from lathe_chatter.model.machine_file import narrowed
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
+from lathe_chatter.nodes.listening_clock import ListeningClock
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
@@ -39,7 +40,7 @@ from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.polled_subscription import PolledSubscription
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
-from lathe_chatter.nodes.supervisor_limits import unsuited
+from lathe_chatter.nodes.supervisor_limits import limits_from, unsuited
 from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
 from lathe_chatter.supervisor import NO_MACHINE, Action, Limits, Mode, Seen, Supervisor
 
@@ -50,6 +51,7 @@ _LOSS = 2.0
 """s after lost samples in which nothing is done."""
 _NO_ANSWER = 2.0
 """s in which the lathe has to answer."""
+_STOOD_STILL = 'this node stood still, and has yet to hear the monitor again'
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Two may come at once; who comes late has the newest."""
@@ -79,6 +81,7 @@ class SupervisorNode(ParameterNode):
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
         self._state = ''
         self._chatter: bool | None = None  # until the monitor has said
+        self._listening = ListeningClock()  # of what is missed, and of answers
         self._heard_at = self._lost_at = -math.inf
         self._lost = self._restarts = self._cut_end = -1.0
         self._reports = DiagnosticsListener()
@@ -126,7 +129,7 @@ class SupervisorNode(ParameterNode):
         if refusal := super()._refusal(parameters):
             return refusal
         try:
-            _limits_of({**self.values, **given})
+            limits_from({**self.values, **given})
         except ParameterError as error:
             return str(error)
         return ''
@@ -143,7 +146,7 @@ class SupervisorNode(ParameterNode):
         Raises:
             LatheChatterError: If that machine is none.
         """
-        limits, self._no_speed = _limits_of(self.values), ''
+        limits, self._no_speed = limits_from(self.values), ''
         files = (described_by(self._told.get(name, {})) for name in (self._lathe, self._monitor))
         spindle = next((f.speed_range for f in files if f and f.speed_range), None)
         if self._cut is not None:
@@ -165,7 +168,7 @@ class SupervisorNode(ParameterNode):
     # -- listening -----------------------------------------------------------------------------
 
     def _on_figure(self, name: str, message: Float64) -> None:
-        self._heard_at = time.monotonic()
+        self._heard_at = self._listening.now()
         self._figures[name] = message.data, self._heard_at
 
     def _newest_flag(self) -> bool | None:
@@ -175,7 +178,7 @@ class SupervisorNode(ParameterNode):
         return self._chatter
 
     def _on_state(self, message: String) -> None:
-        self._state, self._heard_at = message.data, time.monotonic()
+        self._state, self._heard_at = message.data, self._listening.now()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         self._reports.take(message)
@@ -255,25 +258,24 @@ class SupervisorNode(ParameterNode):
     # -- acting --------------------------------------------------------------------------------
 
     def _seen(self, cut: Cut) -> Seen:
-        now, flag = time.monotonic(), self._newest_flag()
+        now, listened, flag = time.monotonic(), self._listening.now(), self._newest_flag()
         # What is not known any more is not published any more.
-        figures = {n: value for n, (value, at) in self._figures.items() if now < at + _SILENCE}
-        heard = self._reports.values(self._monitor, 'cut')
-        believed = heard.get('works with') in _BELIEVED
-        self._core.machine = self._machine if believed else None
+        fresh = {n: value for n, (value, at) in self._figures.items() if listened < at + _SILENCE}
+        works_with = self._reports.values(self._monitor, 'cut').get('works with')
+        self._core.machine = self._machine if works_with in _BELIEVED else None
         number = partial(self._reports.number, self._monitor, 'cut')
         stiffness = math.nan if self._cut_is_new else number('C w, N/m')
         return Seen(
             now,
             cut,
             bool(flag),
-            **figures,
+            **fresh,
             cutting_stiffness=stiffness,
             tool_frequency=number(TOOL_FREQUENCY),
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             lasted=self._lasted(now),
-            hindrance=self._hindrance(now),
-            judged=self._state not in _NOT_JUDGED and now < self._heard_at + _SILENCE,
+            hindrance=self._hindrance(),
+            judged=self._state not in _NOT_JUDGED and listened < self._heard_at + _SILENCE,
             flag_stays=lambda: self._newest_flag() == flag,
         )
 
@@ -284,27 +286,28 @@ class SupervisorNode(ParameterNode):
         pace = min(reached, float(told.get('real_time_factor') or 1.0), 1.0)
         return pace * (now - self._answered_at) - 1.0 / float(told.get('tick_rate', math.inf))
 
-    def _hindrance(self, now: float) -> str:
+    def _hindrance(self) -> str:
         """Why nothing may be done, as the end of a sentence; empty where it may."""
-        if now > self._heard_at + _SILENCE:
-            return 'nothing comes from the monitor'
-        if self._state == UNKNOWN:
-            return 'the monitor does not know the state of the cut'
-        if now < self._lost_at + _LOSS:
-            return 'samples were lost'
-        if self.count_publishers('~/action') > 1:
-            return 'there is another supervisor'
-        if not self._set.service_is_ready():
-            return 'the lathe cannot be reached'
-        return self._no_speed
+        known = [at for _, at in self._figures.values()]
+        reasons = {
+            _STOOD_STILL: self._listening.awaits([self._heard_at, *known], _SILENCE),
+            'nothing comes from the monitor': self._listening.misses(self._heard_at, _SILENCE),
+            'the monitor does not know the state of the cut': self._state == UNKNOWN,
+            'samples were lost': time.monotonic() < self._lost_at + _LOSS,
+            'there is another supervisor': self.count_publishers('~/action') > 1,
+            'the lathe cannot be reached': not self._set.service_is_ready(),
+        }
+        return next((reason for reason, holds in reasons.items() if holds), self._no_speed)
 
     def _look(self) -> None:
         if self._answer is not None:
-            if time.monotonic() > self._answer[1] + _NO_ANSWER:
+            if self._listening.misses(self._answer[1], _NO_ANSWER):
                 self._answer = None
                 self._say_of(self._core.refused('the lathe does not answer'))
         elif self._cut is not None and self._newest_flag() is not None:
-            self._do(self._core.look(self._seen(self._cut)))
+            seen = self._seen(self._cut)
+            if seen.hindrance != _STOOD_STILL:  # after which the monitor soon speaks again
+                self._do(self._core.look(seen))
 
     def _on_accept(self, _request: Any, response: Any) -> Any:
         response.message = 'The lathe is not known yet.'
@@ -330,7 +333,7 @@ class SupervisorNode(ParameterNode):
 
     def _wait(self, future: Any, changes: Mapping[str, float] | None = None) -> None:
         """Until the lathe has answered; nothing else is decided meanwhile."""
-        self._answer = future, time.monotonic()
+        self._answer = future, self._listening.now()
 
         def answered(done: Any) -> None:
             if self._answer is None or self._answer[0] is not done:
@@ -367,7 +370,7 @@ class SupervisorNode(ParameterNode):
         self._diagnostics.publish(self._statuses())
 
     def _statuses(self) -> list[Status]:
-        hindrance = self._hindrance(time.monotonic())
+        hindrance = self._hindrance()
         if self._core.machine is None:
             hindrance = hindrance or NO_MACHINE
         values = {
@@ -386,10 +389,6 @@ def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
         ParameterError: If it cannot.
     """
     return {name: LATHE[name].check(value) for name, value in values.items() if name in LATHE}
-
-
-def _limits_of(values: Mapping[str, Any]) -> Limits:
-    return Limits(**{name: values[name] for name in Limits.__dataclass_fields__})
 
 
 def main() -> None:

@@ -582,8 +582,12 @@ SAID = {
             f'{SUPERVISOR}::test_a_lathe_that_is_none_is_told',
         ),
         'nothing comes from the monitor': (
-            'no message of it for as long as it takes for two',
+            'no message of it for a second in which the node has listened',
             f'{SUPERVISOR}::test_a_silent_monitor_keeps_it_from_acting',
+        ),
+        'this node stood still, and has yet to hear the monitor again': (
+            'it was stopped, or busy, and has yet to hear again what it knew of the monitor',
+            f'{SUPERVISOR}::test_a_supervisor_that_stood_still_blames_nobody',
         ),
         'the monitor does not know the state of the cut': (
             'the latest state is unknown',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -60,6 +61,11 @@ class Cell:
         """As a person would, and chatter comes."""
         assert self.bench.set_together(LATHE, depth_of_cut=DEEP).successful
         self.bench.spin_until(lambda: self.flags[-1].data, 'chatter')
+
+    def await_reports(self, count: int) -> None:
+        """Until so many more have come."""
+        count += len(self.reports)
+        self.bench.spin_until(lambda: len(self.reports) >= count, 'reports')
 
     def await_words(self, words: str) -> None:
         """Until the supervisor has said them."""
@@ -156,6 +162,23 @@ def test_a_silent_monitor_keeps_it_from_acting(cell: Callable[..., Cell]) -> Non
     assert there.get('spindle_speed_rpm') == 3000.0
 
 
+def test_a_supervisor_that_stood_still_blames_nobody(cell: Callable[..., Cell]) -> None:
+    there = cell('mode:=shadow')
+    there.deepen()
+    there.await_words('but only watch')
+    there.reports.clear()
+    for seconds in range(2, 7):  # the lathe and the monitor report once a second
+        there.nodes.signal(SUPERVISOR, signal.SIGSTOP)
+        there.await_reports(3 * seconds)
+        there.nodes.signal(SUPERVISOR, signal.SIGCONT)
+        there.await_reports(5)
+    blaming = 'nothing can be done: nothing comes from the monitor'
+    assert blaming not in {s.message for report in there.reports for s in report.status}
+    assert not there.heard('nothing comes from the monitor')
+    there.nodes.kill('/chatter_monitor')
+    there.await_words('nothing is done, for nothing comes from the monitor')
+
+
 def test_a_cell_that_begins_anew_ends_no_chatter(cell: Callable[..., Cell]) -> None:
     """Lathe and monitor both: nobody counts a restart, and the cut is another."""
     there = cell('mode:=shadow')
@@ -167,8 +190,7 @@ def test_a_cell_that_begins_anew_ends_no_chatter(cell: Callable[..., Cell]) -> N
     there.nodes.start('chatter_monitor')
     there.nodes.start('lathe', 'depth_of_cut:=0.0003', 'bearing_contact:=none')
     there.bench.spin_until(lambda: there.status() == 'ready', 'a monitor that judges')
-    since = len(there.reports)
-    there.bench.spin_until(lambda: len(there.reports) > since + 20, 'some seconds more')
+    there.await_reports(20)
     assert not there.heard('has ended')
 
 
