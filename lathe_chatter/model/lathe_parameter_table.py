@@ -109,6 +109,15 @@ def described_by(values: Mapping[str, Any]) -> MachineDescription | None:
     return load_machine(source) if source else None
 
 
+def checked_parameters(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of some values that are parameters of a lathe, as it can have them.
+
+    Raises:
+        ParameterError: If it cannot.
+    """
+    return {name: LATHE[name].check(value) for name, value in values.items() if name in LATHE}
+
+
 def feed_refusal(given: Mapping[str, Any], present: Mapping[str, Any]) -> str:
     """Why a change of the feed would have no effect, a sentence; empty where it has one.
 

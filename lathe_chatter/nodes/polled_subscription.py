@@ -30,6 +30,18 @@ def publisher_names(node: Node, topic: str) -> list[str]:
     return sorted(map(full_name, offers))
 
 
+def publisher_marks(node: Node, topic: str, of: str | None = None) -> frozenset[tuple[int, ...]]:
+    """The marks that DDS gives to those that publish a topic, of one node only where it is told.
+
+    Args:
+        node: That asks the graph.
+        topic: Its full name.
+        of: Full name of the node.
+    """
+    offers = node.get_publishers_info_by_topic(topic)
+    return frozenset(tuple(o.endpoint_gid) for o in offers if of is None or full_name(o) == of)
+
+
 def full_name(offer: TopicEndpointInfo) -> str:
     """Of the node that publishes; DDS may tell of a publisher before it tells of its node."""
     if offer.node_name == _NOT_KNOWN:
@@ -103,8 +115,7 @@ class PolledSubscription:
 
     def publishers(self) -> frozenset[tuple[int, ...]]:
         """The marks that DDS gives to those that publish the topic."""
-        offers = self._node.get_publishers_info_by_topic(self._subscription.topic_name)
-        return frozenset(tuple(offer.endpoint_gid) for offer in offers)
+        return publisher_marks(self._node, self._subscription.topic_name)
 
     def end(self) -> None:
         """Unsubscribe."""

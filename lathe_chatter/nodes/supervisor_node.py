@@ -24,7 +24,7 @@ from lathe_chatter.detection.estimate import Mode as Works
 from lathe_chatter.errors import LatheChatterError, ParameterError
 from lathe_chatter.model import Cut, Machine
 from lathe_chatter.model.lathe_parameter_table import (
-    LATHE,
+    checked_parameters,
     cut_from,
     described_by,
     machine_from,
@@ -37,7 +37,7 @@ from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
-from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.nodes.polled_subscription import PolledSubscription, publisher_marks
 from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.supervisor_limits import limits_from, unsuited
@@ -52,6 +52,7 @@ _LOSS = 2.0
 _NO_ANSWER = 2.0
 """s in which the lathe has to answer."""
 _STOOD_STILL = 'this node stood still, and has yet to hear the monitor again'
+_EVENTS = '/parameter_events'  # which every node publishes
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Two may come at once; who comes late has the newest."""
@@ -84,6 +85,7 @@ class SupervisorNode(ParameterNode):
         self._listening = ListeningClock()  # of what is missed, and of answers
         self._heard_at = self._lost_at = -math.inf
         self._lost = self._restarts = self._cut_end = -1.0
+        self._marks: frozenset[tuple[int, ...]] = frozenset()  # of the lathe
         self._reports = DiagnosticsListener()
         self._told: dict[str, dict[str, Any]] = {}  # of lathe and monitor
         self._cut_is_new = False  # for the monitor's figures
@@ -109,7 +111,7 @@ class SupervisorNode(ParameterNode):
         for kind, topic, qos, hear in (
             (String, 'chatter_monitor/state', _LATCHED, self._on_state),
             (DiagnosticArray, '/diagnostics', QoSProfile(depth=10), self._on_diagnostics),
-            (ParameterEvent, '/parameter_events', QoSProfile(depth=100), self._on_event),
+            (ParameterEvent, _EVENTS, QoSProfile(depth=100), self._on_event),
         ):
             self.create_subscription(kind, topic, hear, qos)
         self._flags = PolledSubscription(self, Bool, 'chatter_monitor/chatter', _LATCHED)
@@ -203,6 +205,13 @@ class SupervisorNode(ParameterNode):
         self._core.another_run()
         self._ask_again()
 
+    def _is_known_lathe(self) -> bool:
+        """Whether none has come since it told what it is: one that comes is asked."""
+        known = publisher_marks(self, _EVENTS, self._lathe) <= self._marks
+        if not known:
+            self._begin_again()
+        return known
+
     def _ask_again(self) -> None:
         """What the lathe is, is not known any more."""
         self._cut = None
@@ -217,7 +226,7 @@ class SupervisorNode(ParameterNode):
         entries = (*event.new_parameters, *event.changed_parameters)
         values = {p.name: parameter_value_to_python(p.value) for p in entries}
         try:
-            changed = {n: v for n, v in _checked(values).items() if known.get(n) != v}
+            changed = {n: v for n, v in checked_parameters(values).items() if known.get(n) != v}
             if any(self._sent.get(name) != value for name, value in changed.items()):
                 self._say_of(self._core.hand_moved(time.monotonic()))
             self._take_changes(changed)
@@ -235,7 +244,7 @@ class SupervisorNode(ParameterNode):
     def _take_parameters(self, name: str, values: dict[str, Any]) -> None:
         known = {n: v for n, v in values.items() if v is not None}
         try:
-            self._told[name] = _checked(known) if name == self._lathe else known
+            self._told[name] = checked_parameters(known) if name == self._lathe else known
         except LatheChatterError as error:
             self._doubt(name, error)
             return
@@ -245,6 +254,7 @@ class SupervisorNode(ParameterNode):
             told = self._told.get(self._lathe, {})
         try:
             if name == self._lathe:
+                self._marks = publisher_marks(self, _EVENTS, name)
                 self._take_changes(self._told[name])
             self._core.limits = self._limits()
             if told and source != ModelSource.NONE.value:
@@ -276,7 +286,7 @@ class SupervisorNode(ParameterNode):
             lasted=self._lasted(now),
             hindrance=self._hindrance(),
             judged=self._state not in _NOT_JUDGED and listened < self._heard_at + _SILENCE,
-            flag_stays=lambda: self._newest_flag() == flag,
+            flag_stays=lambda: self._is_known_lathe() and self._newest_flag() == flag,
         )
 
     def _lasted(self, now: float) -> float:
@@ -311,7 +321,7 @@ class SupervisorNode(ParameterNode):
 
     def _on_accept(self, _request: Any, response: Any) -> Any:
         response.message = 'The lathe is not known yet.'
-        if self._cut is not None:
+        if self._is_known_lathe() and self._cut is not None:
             done, message, action = self._core.accept(self._seen(self._cut))
             response.success, response.message = done, message
             self._do(action)
@@ -364,6 +374,7 @@ class SupervisorNode(ParameterNode):
 
     def _report(self) -> None:
         """Once a second."""
+        self._is_known_lathe()
         self._remote.ask(self._lathe)
         self._remote.ask(self._monitor)
         self._remote.look()
@@ -380,15 +391,6 @@ class SupervisorNode(ParameterNode):
         }
         able = f'nothing can be done: {hindrance}' if hindrance else 'ready'
         return [Status('action', WARN if hindrance else OK, able, values)]
-
-
-def _checked(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters of a lathe as it can have them: whoever says so may be none.
-
-    Raises:
-        ParameterError: If it cannot.
-    """
-    return {name: LATHE[name].check(value) for name, value in values.items() if name in LATHE}
 
 
 def main() -> None:

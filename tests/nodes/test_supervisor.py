@@ -11,6 +11,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from std_msgs.msg import Bool, String
@@ -72,6 +73,12 @@ class Cell:
         self.bench.spin_until(lambda: self.heard(words), f'"{words}"')
 
 
+def changes_in(log: list[Log]) -> list[Any]:
+    """The changes of the cut that a lathe has logged."""
+    found = (parse_change(message.msg) for message in log if message.name == 'lathe')
+    return [each for each in found if each is not None]
+
+
 @pytest.fixture
 def cell(nodes: NodeProcesses, bench: Bench) -> Callable[..., Cell]:
     return lambda *parameters: Cell(nodes, bench, *parameters)
@@ -94,8 +101,7 @@ def test_no_step_of_a_move_is_beyond_the_ramp(cell: Callable[..., Cell], factor:
     there.bench.set_together(LATHE, real_time_factor=factor)
     there.deepen()
     there.await_words('The chatter has ended')
-    found = [parse_change(message.msg) for message in log if message.name == 'lathe']
-    steps = [each for each in found if each is not None]
+    steps = changes_in(log)
     assert len(steps) > 3
     for before, step in pairwise(steps):
         old, new = (each.get('spindle_speed_rpm', 0.0) for each in (step.old, step.new))
@@ -296,6 +302,24 @@ def test_a_lathe_that_is_none_is_told(start: Callable[..., Any], bench: Bench) -
     start(SupervisorNode)
     said = '/lathe does not say what it is: '
     bench.spin_until(lambda: any(entry.msg.startswith(said) for entry in log), 'the sentence')
+
+
+def test_another_lathe_is_not_taken_for_the_one_before(
+    start: Callable[..., Any], bench: Bench
+) -> None:
+    """Neither a monitor nor the time of its cut tells that it is another."""
+    log = bench.listen_first(Log, '/rosout', LATCHED)
+
+    def of_another(speed: float) -> Node:
+        lathe = bench.another('lathe')
+        lathe.declare_parameter('spindle_speed_rpm', speed)
+        said = f'fastest_speed, 5000 rev/min, though the lathe has {speed:g} rev/min.'
+        bench.spin_until(lambda: any(said in entry.msg for entry in log), said)
+        return lathe
+
+    start(SupervisorNode, fastest_speed=5000.0)
+    bench.let_go(of_another(7000.0))
+    of_another(6000.0)
 
 
 def test_a_lathe_that_does_not_answer_is_told(start: Callable[..., Any]) -> None:
