@@ -162,6 +162,7 @@ class OperatedCell:
                     self._end_scenario('is stopped, for the lathe has begun anew')
                 if had_begun and not self._resetting:
                     self.clients.values.pop('lathe', None)  # it may be another one
+                    self.board.put('lathe_values', {})
 
     def _on_flag(self, message: Bool) -> None:
         """The lamp; since when it is lit or out, the monitor's diagnostics say."""

@@ -222,5 +222,7 @@ def test_a_field_that_has_the_focus_follows_a_lathe_that_begins_anew(
     browser.until('document.querySelector("#gone").textContent.includes("silent")', 'its end')
     page.start('lathe', 'force_noise:=0.001')
     browser.until('cell.lathe_values.depth_of_cut === 0.0005', 'its parameters', PATIENCE)
+    browser.until('trail.length', 'its way')
+    assert browser.run('trail.map(({depth}) => depth)') == [0.0005]  # nothing of the one before
     assert browser.run('document.activeElement.id') == 'p-depth_of_cut'
     assert browser.run('document.activeElement.value') == '0.5'

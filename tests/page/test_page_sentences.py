@@ -128,7 +128,7 @@ SAID = {
         ),
         ' Lost: {}.': ('these told so, and nothing is known of the pace', KILLED),
         '{} by {}': ('so many samples did not come to it, as it told', KILLED),
-        '{}{}, {} messages': ('the recorder speaks, and told that', CONTROLS),
+        '. {} messages went into {}.': ('the recorder speaks, and told that', CONTROLS),
         'The chart is being computed ...': ('it is, and none was before', CUTS),
         ' The chart is being computed anew ...': ('it is, of another cut or machine', CURED),
         'The cut: {} rev/min, {} mm. Limits there: {}, below which every depth is stable to '
@@ -208,7 +208,7 @@ NO_SENTENCE = {
     'Hz', 'N/√Hz', 'g mm', '{} Hz', '{} mm', '{} rev/min', '{} s', '{} s{}', '{} s: {}', '{}{} s',
     '{}{} /s', '{} µm', '{} / µm', 'frequency / Hz', 'amplitude / µm', 'depth of cut / mm',
     'simulated time / s', 'spindle speed / (rev/min)', 'velocity / (mm/s)', 'from {} to {} s',
-    '{} to {}', '{} from {} to {} {}', '{} {}: it {} {}', ' into {}', '{}, slider',
+    '{} to {}', '{} from {} to {} {}', '{} {}: it {} {}', '{}, slider',
     'the monitor', 'the recorder', 'this page',
 }  # fmt: skip
 HEADINGS = {

@@ -175,7 +175,7 @@ function takeServer(news) {
   Object.assign(server, news);
   const free = !server.operator;
   $('operate').textContent = server.operating ? 'Look on' : free ? 'Operate' : 'Take over';
-  $('operate').setAttribute('aria-pressed', String(server.operating));
+  $('operate').setAttribute('aria-pressed', String(!!server.operating && !unanswered));
   $('operate').disabled = !server.trusted || !!unanswered;
   document.body.classList.toggle('looking-on', !server.operating);
   lock();
@@ -307,7 +307,7 @@ function showStatuses() {
   $('health').className = (pace?.level ?? 0) || lost.length ? 'bad' : '';
   $('health').textContent = old ? `${old}${lost.length ? ` Lost: ${lost.join(', ')}.` : ''}` : pace ? `${pace.message}: ${number(Number(v['real-time factor']))} × real time, late by ${number(Number(v['lateness p99, us']) / 1e3)} ms (p99), ${number(Number(v['lag given up, s']))} s given up. Lost: ${lost.join(', ') || 'nothing'}.` : '';
   const recording = recorder?.recording;
-  $('recording').textContent = unanswered ? 'Not known while the server of this page does not answer.' : cell.alive?.recorder === false ? 'No recorder speaks.' : recording ? `${recording.message}${recording.values.run ? ` into ${recording.values.run}` : ''}, ${recording.values.messages} messages` : 'No recorder has spoken.';
+  $('recording').textContent = unanswered ? 'Not known while the server of this page does not answer.' : cell.alive?.recorder === false ? 'No recorder speaks.' : recording ? `${recording.message}${recording.values.run ? `. ${recording.values.messages} messages went into ${recording.values.run}.` : ''}` : 'No recorder has spoken.';
   showFigures();
 }
 
