@@ -25,6 +25,8 @@ _HELD = re.compile(r' \(\d+ of this kind in \d+ s\.\)$')
 _GAP = re.compile(r'At ([\d.]+) s: the samples up to ([\d.]+) s did not come\.')
 _MISSING = re.compile(r'/lathe/samples: (\d+) samples .*did not come\.')
 _FLAG = re.compile(r'At ([\d.]+) s: (?:the (chatter has died out)|chatter)')
+_MOVE = re.compile(r'.*: I set spindle_speed_rpm from ([\d.]+) to ')
+_STEP = re.compile(r'At [\d.]+ s: spindle_speed_rpm ([\d.]+) -> ')
 _SENSES = re.compile(r'works with: |the tool, told at|times of the samples jump|best effort only')
 """Of sensors, machine and publishers that were all the time as they ought to be."""
 _MOST_LINES = 60.0
@@ -136,7 +138,7 @@ def _judge_silence_and_clock(said: dict[str, list[Said]], done: Done) -> Iterato
 
 
 def _judge_supervisor(said: dict[str, list[Said]]) -> Iterator[str]:
-    """That it says that chatter has ended only after the monitor has found so."""
+    """That chatter has ended only after the monitor has found so, and from which cut it moves."""
     died = [e.at for e in said.get('chatter_monitor', []) if 'chatter has died out' in e.text]
     before = 0.0
     for each in said.get('chatter_supervisor', []):
@@ -144,6 +146,14 @@ def _judge_supervisor(said: dict[str, list[Said]]) -> Iterator[str]:
             if not any(before - _LATE < at < each.at + _LATE for at in died):
                 yield f'at {each.at:.1f} the supervisor said: {each.text} But nobody knows.'
             before = each.at
+        if move := _MOVE.match(each.text):
+            steps = [
+                float(step[1])
+                for event in said.get('lathe', [])
+                if each.at - 0.1 < event.at < each.at + 1.0 and (step := _STEP.match(event.text))
+            ]
+            if steps and abs(steps[0] - float(move[1])) > 1.0:
+                yield f'at {each.at:.1f} the lathe turned at {steps[0]:g} rev/min: {each.text}'
 
 
 def _judge_losses_of_monitor(sentences: list[Said], done: Done) -> Iterator[str]:
