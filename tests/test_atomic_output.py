@@ -13,6 +13,7 @@ from lathe_chatter.atomic_output import atomic_output
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.export import to_csv
 from lathe_chatter.recording.one_message_per_sample import unroll
+from lathe_chatter.recording.sample_series import Selection
 
 RUN = Path(__file__).parent / 'golden' / 'run'
 KILLED = """
@@ -21,9 +22,10 @@ from pathlib import Path
 from lathe_chatter.recording import read_run
 from lathe_chatter.recording.export import to_csv
 from lathe_chatter.recording.one_message_per_sample import unroll
+from lathe_chatter.recording.sample_series import Selection
 write = {'to_csv': to_csv, 'unroll': unroll}[sys.argv[1]]
 kill = lambda _: os.kill(os.getpid(), signal.SIGKILL)
-write(read_run(sys.argv[2]), Path(sys.argv[3]), None, kill)
+write(read_run(sys.argv[2]), Path(sys.argv[3]), Selection(), kill)
 """
 
 
@@ -37,7 +39,7 @@ def test_a_killed_export_leaves_nothing_in_its_place_and_the_next_clears_up(
     assert subprocess.run(call, check=False).returncode == -9
     assert not path.exists()
     assert [*path.parent.iterdir()] == [path.parent / '.out.csv.partial']
-    write(read_run(RUN), path)
+    write(read_run(RUN), path, Selection(), lambda _count: None)
     assert [*path.parent.iterdir()] == [path]
 
 

@@ -157,7 +157,7 @@ def _has_samples(output: Path) -> bool:
     """Whether a run was begun and has samples of a lathe."""
     try:
         run = read_run(output)
-        topics = [name for name in run.topics if name.endswith('/samples')]
+        topics = run.samples_topics()
         return any(True for _ in run.raw_messages(*topics)) if topics else False
     except RunReadError:
         return False

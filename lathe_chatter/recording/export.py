@@ -44,9 +44,7 @@ class Exported(NamedTuple):
     continuity: Continuity
 
 
-def to_csv(
-    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
-) -> Exported:
+def to_csv(run: Run, path: Path, chosen: Selection, progress: Progress) -> Exported:
     """Write samples as CSV; every number is read back to its last bit.
 
     The head has the names of the columns, each with its unit, as `cutting_force [N]`.
@@ -56,7 +54,7 @@ def to_csv(
         RunReadError: If the run cannot be read, or has no such samples.
         OSError: If the file cannot be written.
     """
-    parts = ExportedParts(run, chosen or Selection(), progress)
+    parts = ExportedParts(run, chosen, progress)
     with _new(path) as file, file.open('w', encoding='ascii', newline='') as stream:
         stream.write(','.join(f'{name} [{UNITS.get(name, "")}]' for name in parts.names) + '\n')
         for part in parts:
@@ -64,9 +62,7 @@ def to_csv(
     return Exported(path, parts.count, parts.continuity)
 
 
-def to_parquet(
-    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
-) -> Exported:
+def to_parquet(run: Run, path: Path, chosen: Selection, progress: Progress) -> Exported:
     """Write samples as Parquet, with units, gaps and restarts in its metadata.
 
     Raises:
@@ -77,7 +73,7 @@ def to_parquet(
     """
     arrow = optional('pyarrow', 'Parquet')
     parquet = optional('pyarrow.parquet', 'Parquet')
-    parts = ExportedParts(run, chosen or Selection(), progress)
+    parts = ExportedParts(run, chosen, progress)
     schema = arrow.schema(
         [
             arrow.field(n, arrow.float64(), nullable=False, metadata={'unit': UNITS.get(n, '')})
@@ -95,9 +91,7 @@ def to_parquet(
     return Exported(path, parts.count, parts.continuity)
 
 
-def to_mat(
-    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
-) -> Exported:
+def to_mat(run: Run, path: Path, chosen: Selection, progress: Progress) -> Exported:
     """Write samples as a MAT file (version 5) for MATLAB, Octave and SciPy.
 
     Each signal is a column of doubles; beside them `units`, a structure, `gaps` and `restarts`
@@ -110,7 +104,7 @@ def to_mat(
     """
     from scipy.io import savemat  # half a second to load, and only wanted here
 
-    parts = ExportedParts(run, chosen or Selection(), progress)
+    parts = ExportedParts(run, chosen, progress)
     with _new(path) as file:
         kept = []
         for part in parts:
@@ -140,9 +134,7 @@ def to_mat(
     return Exported(path, parts.count, parts.continuity)
 
 
-def to_hdf5(
-    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
-) -> Exported:
+def to_hdf5(run: Run, path: Path, chosen: Selection, progress: Progress) -> Exported:
     """Write samples as HDF5, which MATLAB (`h5read`), h5py and many others read.
 
     Each signal is a dataset with its `units`; beside them `gaps` and `restarts` (m x 2, s).
@@ -154,7 +146,7 @@ def to_hdf5(
         OSError: If the file cannot be written.
     """
     h5py = optional('h5py', 'HDF5')
-    parts = ExportedParts(run, chosen or Selection(), progress)
+    parts = ExportedParts(run, chosen, progress)
     with _new(path) as whole, h5py.File(whole, 'w') as file:
         kind = {'dtype': 'f8', 'maxshape': (None,), 'chunks': (1 << 16,)}
         signals = [file.create_dataset(name, (0,), **kind) for name in parts.names]
@@ -187,7 +179,7 @@ class ExportedParts:
         before: How long the cuts took that were before each of the latest part, s (n,).
     """
 
-    def __init__(self, run: Run, chosen: Selection, progress: Progress | None) -> None:
+    def __init__(self, run: Run, chosen: Selection, progress: Progress) -> None:
         """Look whether there are such columns.
 
         Raises:
@@ -226,8 +218,7 @@ class ExportedParts:
                 self.continuity.follow(signals[self.names.index(TIME)])
                 self.count += signals.shape[1]
                 yield signals.T
-            if self._progress is not None:
-                self._progress(len(blocks.times))
+            self._progress(len(blocks.times))
         if self.count == 0:
             start, end = self._chosen.start, self._chosen.end
             until = f'to {time_text(end)}' if math.isfinite(end) else 'on'

@@ -28,10 +28,9 @@ def check_files(found: Verification) -> None:
         if not file.has_end:
             found.add_loss(f'{name} has no sound summary: readers that need one refuse it.')
             continue
-        proof = file.prove()
-        if proof is False:
+        if file.proof is False:
             found.add_loss(f'{name} is not, byte for byte, what was written.')
-        elif proof is None:
+        elif file.proof is None:
             what = 'any of it' if file.unproven else 'what stands outside of its chunks'
             found.remark(
                 f'{name} has no CRC of its data: whether {what} was altered cannot be told.'

@@ -10,6 +10,7 @@ from typing import Any
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.recording.clock_steps import CLOCK, ClockWatch
+from lathe_chatter.recording.cut_log import logger_of
 from lathe_chatter.recording.provenance import (
     IDENTITY,
     PARAMETERS,
@@ -105,8 +106,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
 
     def log(self, sentence: str) -> None:
         """Write what happened to the cut, a sentence of `change_and_knock_sentences`."""
-        logger = self.name.lstrip('/').replace('/', '.')
-        self._add('/rosout', log_bytes(logger, sentence, self._stamp()))
+        self._add('/rosout', log_bytes(logger_of(self.name), sentence, self._stamp()))
 
     def publish(self, topic: str, kind: str, **fields: Any) -> None:
         """Write a message of another topic, as `std_msgs/msg/Bool` with `data=True`."""

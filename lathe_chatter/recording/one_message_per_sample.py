@@ -26,9 +26,7 @@ _COMMIT_AFTER = 100_000
 """Messages after which the file is put on disk."""
 
 
-def unroll(
-    run: Run, path: Path, chosen: Selection | None = None, progress: Progress | None = None
-) -> Exported:
+def unroll(run: Run, path: Path, chosen: Selection, progress: Progress) -> Exported:
     """Write a run with one std_msgs/Float64 for each sample of each signal.
 
     The topics are `<samples>/<column>`, and the messages are dated by simulated time since the
@@ -41,7 +39,6 @@ def unroll(
         RunReadError: If the run cannot be read, or has no such samples.
         OSError: If it cannot be written.
     """
-    chosen = chosen or Selection()
     topic = chosen.topic or run.samples_topic()
     parts = ExportedParts(run, chosen, progress)
     others = _others(run, topic, chosen)

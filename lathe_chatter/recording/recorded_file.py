@@ -7,7 +7,7 @@ import struct
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cached_property, partial
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -111,7 +111,6 @@ class RecordedFile:
         self.known = summary or Summary(0)
         self.unproven = False
         self._walked = self.known.names_all
-        self._proofs: list[bool | None] = []
         self._data_end = 0
         self._told = False
         self._walk = partial(scan, path, end=self.known.data_end)
@@ -223,7 +222,7 @@ class RecordedFile:
                 self.on_damage(Damage(self.path, span.offset, span.offset, reason))
             yield span
 
-    @property
+    @cached_property
     def in_time_order(self) -> bool:
         """Whether no chunk has a message that was received before one of an earlier chunk."""
         statistics = self.known.statistics
@@ -277,33 +276,30 @@ class RecordedFile:
             self.known.schemas = known.schemas | self.known.schemas
             self.known.channels = known.channels | self.known.channels
 
-    def prove(self) -> bool | None:
+    @cached_property
+    def proof(self) -> bool | None:
         """Whether all data have their CRC; None where there is none, or no end of the data.
 
         Raises:
             OSError: If the file cannot be read.
         """
-        if not self._proofs:
-            expected, end = self.known.data_crc, self.known.data_end
-            if end is None:  # a damaged summary
-                plain = (each for each in self._walk(chunks=False) if isinstance(each, Plain))
-                last = next((each for each in plain if each.opcode == Opcode.DATA_END), None)
-                (expected,) = struct.unpack('<I', last.content) if last else (0,)
-                end = last.offset - _RECORD.size if last else self.path.stat().st_size
-            self._data_end = end
-            sound = body_is_sound(self.path, self._data_end, expected) if expected else None
-            self._proofs.append(sound)
-        return self._proofs[0]
+        expected, end = self.known.data_crc, self.known.data_end
+        if end is None:  # a damaged summary
+            plain = (each for each in self._walk(chunks=False) if isinstance(each, Plain))
+            last = next((each for each in plain if each.opcode == Opcode.DATA_END), None)
+            (expected,) = struct.unpack('<I', last.content) if last else (0,)
+            end = last.offset - _RECORD.size if last else self.path.stat().st_size
+        self._data_end = end
+        return body_is_sound(self.path, end, expected) if expected else None
 
     def _is_proven(self, offset: int) -> bool:
         """Whether nothing speaks against what has no CRC of its own: that of all data may."""
-        proof = self.prove()
-        self.unproven = self.unproven or proof is None
-        if proof is False and not self._told:
+        self.unproven = self.unproven or self.proof is None
+        if self.proof is False and not self._told:
             self._told = True
             reason = 'its messages have no CRC of their own, and that of the file is another'
             self.on_damage(Damage(self.path, offset, self._data_end, reason))
-        return proof is not False
+        return self.proof is not False
 
     def contradictions(self) -> Iterator[str]:
         """Where the summary says what is not so, as phrases."""

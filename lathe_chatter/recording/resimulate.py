@@ -12,8 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from lathe_chatter.errors import (
     LayoutError,
     MixedSamplesError,
@@ -35,7 +33,6 @@ from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.run_timeline import blocks_as_written
 from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.recording.verify import Finding
-from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 
 @dataclass
@@ -82,12 +79,7 @@ def resimulate(run: Run | Path | str) -> list[Resimulation]:
             samples of a lathe in it.
     """
     run = run if isinstance(run, Run) else read_run(run)
-    names = [
-        name
-        for name, kind in sorted(run.topics.items())
-        if kind == SAMPLES_TYPE and name.endswith('/samples')
-    ]
-    if not names:
+    if not (names := run.samples_topics()):
         raise RunReadError(f'{run.path} holds no samples of a lathe to compute again.')
     return [_resimulated(run, name) for name in names]
 
@@ -137,21 +129,11 @@ def _by_session(
     cuts: RecordedCuts, blocks: SampleBlocks, done: int
 ) -> Iterator[tuple[CutSession, SampleBlocks]]:
     """Blocks, of which `done` were before, by the session that they are of."""
-    ends = np.concatenate((np.zeros(1, np.int64), np.cumsum(blocks.rows)))
     for session in cuts.sampled:
         first = max(session.blocks.start - done, 0)
         after = min(session.blocks.stop - done, len(blocks.rows))
         if first < after:
-            yield (
-                session,
-                SampleBlocks(
-                    blocks.columns,
-                    blocks.signals[:, ends[first] : ends[after]],
-                    blocks.rows[first:after],
-                    blocks.log_times[first:after],
-                    blocks.publish_times[first:after],
-                ),
-            )
+            yield session, blocks.some(first, after)
 
 
 def finding_of(found: Resimulation) -> Finding:

@@ -261,7 +261,7 @@ class Run:
         Raises:
             RunReadError: If there is none, or several and none is named.
         """
-        names = self._samples_topics()
+        names = self.samples_topics()
         if named is not None:
             if named not in names:
                 raise self.without_samples(named)
@@ -283,9 +283,10 @@ class Run:
         """
         names = sorted(name for name in self.topics if MONITOR in name)
         beside = [name for name in names if namespace_of(name) == namespace_of(samples)]
-        return beside or (names if len(self._samples_topics()) == 1 else [])
+        return beside or (names if len(self.samples_topics()) == 1 else [])
 
-    def _samples_topics(self) -> list[str]:
+    def samples_topics(self) -> list[str]:
+        """The topics of the samples of all its lathes, by name."""
         return sorted(
             name
             for name, kind in self.topics.items()

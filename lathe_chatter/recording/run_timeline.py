@@ -169,7 +169,10 @@ def read_timeline(
         found += [each._replace(place=written + each.place) for each in messages]
         places.append(written + of_samples)
         written += there
-    blocks = [_ends(each) for each in run.sample_blocks(samples, (TIME,))]
+    blocks = [
+        _Ends(each.rows, each.log_times, each.publish_times, each.spans)
+        for each in run.sample_blocks(samples, (TIME,))
+    ]
     return _timeline(run, _joined(places), blocks), found
 
 
@@ -207,21 +210,12 @@ def _places(file: RecordedFile, messages: Messages, topics: tuple[str, ...]) -> 
 
 
 class _Ends(NamedTuple):
-    """Blocks (n,) by the times of their first and last samples, s; 0 in those without samples."""
+    """What is kept of blocks (n,): of their samples the first and last times alone."""
 
     rows: Integers
     received: Integers
     published: Integers
-    times: Array
-
-
-def _ends(blocks: SampleBlocks) -> _Ends:
-    some = blocks.rows > 0
-    last = np.cumsum(blocks.rows)[some] - 1
-    times = np.zeros((len(blocks.rows), 2))
-    times[some, 0] = blocks.times[last - blocks.rows[some] + 1]
-    times[some, 1] = blocks.times[last]
-    return _Ends(blocks.rows, blocks.log_times, blocks.publish_times, times)
+    spans: Array
 
 
 def _joined(parts: list[Integers]) -> Integers:
@@ -251,7 +245,8 @@ def _timeline(run: Run, places: Integers, blocks: list[_Ends]) -> Timeline:
     some = rows > 0
     received = _joined([each.received for each in blocks])[:count][some]
     published = _joined([each.published for each in blocks])[:count][some]
-    times = np.concatenate([np.zeros((0, 2)), *(each.times for each in blocks)])[:count][some]
+    spans = np.hstack([np.zeros((2, 0)), *(each.spans for each in blocks)])
+    first, last = spans[:, :count][:, some]
     back, sizes = steps_back(received)
     since = np.zeros(len(received), np.int64)
     since[back + 1] = sizes
@@ -272,10 +267,10 @@ def _timeline(run: Run, places: Integers, blocks: list[_Ends]) -> Timeline:
         places[some],
         received,
         np.minimum(published - offsets, received),
-        times[:, 0],
-        times[:, 1],
+        first,
+        last,
         rows[some],
-        tuple((float(times[k, 1]) if len(times) else 0.0, seconds) for k, seconds in steps),
+        tuple((float(last[k]) if len(last) else 0.0, seconds) for k, seconds in steps),
         offsets,
     )
 

@@ -33,7 +33,6 @@ from lathe_chatter.recording.recorder_stalls import STALL
 from lathe_chatter.recording.run import Run, read_run
 from lathe_chatter.recording.sequence_gaps import Numbering
 from lathe_chatter.recording.verification_result import Finding, SampleCount, Verification
-from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.samples.continuity import Continuity, missing_in, time_text
 from lathe_chatter.samples.mixed_streams import MixedContinuity
 
@@ -163,9 +162,7 @@ def _publishers(run: Run) -> dict[str, int]:
 
 def _check_samples(found: Verification, progress: Progress) -> None:
     """That the samples follow each other, by their own times."""
-    for topic, kind in sorted(found.run.topics.items()):
-        if kind != SAMPLES_TYPE or not topic.endswith('/samples'):
-            continue
+    for topic in found.run.samples_topics():
         continuity = MixedContinuity(remember=True)
         count, first, last, strange = 0, math.nan, math.nan, 0
         received: list[Integers] = [np.zeros(0, np.int64)]
