@@ -24,10 +24,15 @@ from lathe_chatter.recording import read_run
 from lathe_chatter.recording.chunk_messages import messages_of
 from lathe_chatter.recording.mcap_chunk_walk import Chunk, record_at
 from lathe_chatter.recording.recorded_file import RecordedFile
+from lathe_chatter.recording.sample_blocks import (
+    BlockJoiner,
+    CutsInARow,
+    SampleBlocks,
+    stretches_of,
+)
 from lathe_chatter.report.monitor_record import value_near
 from lathe_chatter.report.operating_points import stays_of
 from lathe_chatter.report.run_history import History, in_words, read_history
-from lathe_chatter.samples.codec import SampleDecoder
 
 COLUMNS = ('time', 'spindle_angle', *SIGNALS)
 _GLANCES = 150
@@ -89,20 +94,18 @@ class RecordedRun:
 
     def _glances(self) -> Iterator[tuple[tuple[float, float, float], Array, Array]]:
         """Some chunks of each file: where, and their smallest and largest values."""
-        offset = 0.0
-        last = self._end = -math.inf
+        self._end, cuts = -math.inf, CutsInARow()
         for file in self._run.opened:
             places = file.known.chunks
             every = max(1, len(places) * len(self._run.opened) // _GLANCES)
             for place in [*places[:-1:every], *places[-1:]]:
                 block, received = self._chunk(file, place.offset)
                 if len(block):
-                    if block[0, 0] + offset <= last:
-                        offset = last
-                    last = self._end = float(block[-1, 0]) + offset
-                    where = float(block[0, 0]) + offset, offset, float(received[0])
+                    (before,) = cuts.before(block[:1, 0], block[-1:, 0]).tolist()
+                    self._end = float(block[-1, 0]) + before
+                    where = float(block[0, 0]) + before, before, float(received[0])
                     yield where, block[:, 2:].min(axis=0), block[:, 2:].max(axis=0)
-        if last == -math.inf:  # a file without an index
+        if self._end == -math.inf:  # a file without an index
             for part in self._run.sample_blocks(self._topic):
                 if part.times.size:
                     values, self._end = _picked(part)[:, 2:], float(part.times[-1])
@@ -111,18 +114,14 @@ class RecordedRun:
 
     def _chunk(self, file: RecordedFile, offset: int) -> tuple[Array, Integers]:
         """The samples of a chunk (n, 6), and when each was received, ns."""
-        none = np.zeros((0, len(COLUMNS))), np.zeros(0, np.int64)
-        chunk = record_at(file.path, offset)
-        if not isinstance(chunk, Chunk):
-            return none  # damaged: `read` says so
-        messages = messages_of(chunk).of(*file.channels_of(self._topic))
-        decoder, blocks, received = SampleDecoder(), [], []
-        for k in range(len(messages.heads)):
-            samples, columns = decoder.decode(messages.payload(k))
-            picked = [columns.index(name) if name in columns else -1 for name in COLUMNS]
-            blocks.append(np.where(np.array(picked) >= 0, samples[:, picked], np.nan))
-            received.append(np.full(len(samples), messages.heads['log_time'][k], np.int64))
-        return (np.concatenate(blocks), np.concatenate(received)) if blocks else none
+        chunk, joiner = record_at(file.path, offset), BlockJoiner(COLUMNS)
+        if isinstance(chunk, Chunk):  # else it is damaged: `read` says so
+            messages = messages_of(chunk).of(*file.channels_of(self._topic))
+            joiner.add_all(stretches_of(messages))
+        parts = joiner.taken()
+        blocks = [np.zeros((0, len(COLUMNS))), *map(_picked, parts)]
+        received = [np.zeros(0, np.int64), *(np.repeat(p.log_times, p.rows) for p in parts)]
+        return np.concatenate(blocks), np.concatenate(received)
 
     async def read(self) -> None:
         """Let all samples pass by, then find out what happened."""
@@ -140,37 +139,33 @@ class RecordedRun:
         lows: list[Any] = []
         highs: list[Any] = []
         places: list[Array] = []
-        offset, last, passed = 0.0, -math.inf, 0
+        cuts, passed, end = CutsInARow(), 0, self._end
         expected = sum(file.count(self._topic) for file in self._run.opened)
         for part in self._run.sample_blocks(self._topic, COLUMNS):
-            times = part.times
-            if not times.size:
+            some = part.rows > 0
+            if not some.any():
                 continue
-            first = np.cumsum(part.rows) - part.rows
-            first = first[part.rows > 0]
-            begins = [0, *(np.flatnonzero(np.diff(times) <= 0.0) + 1).tolist()]
-            for begin, stop in zip(begins, [*begins[1:], len(times)], strict=True):
-                if times[begin] + offset <= last:
-                    offset = last
-                on_axis = times[begin:stop] + offset
-                last = float(on_axis[-1])
-                number = np.floor(on_axis / length + 1e-6).astype(np.int64)
-                change = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
-                values = _picked(part)[begin:stop, 2:]
-                numbers.append(number[change])
-                # As float32, of which an hour takes 60 MB.
-                lows.append(np.minimum.reduceat(values, change).astype(np.float32))
-                highs.append(np.maximum.reduceat(values, change).astype(np.float32))
-                inside = np.flatnonzero((first >= begin) & (first < stop))[::16]
-                received = part.log_times[part.rows > 0][inside]
-                on = times[first[inside]] + offset
-                places.append(np.column_stack((on, np.full(len(on), offset), received)))
+            before = cuts.before(*part.spans[:, some])
+            on_axis = part.times + np.repeat(before, part.rows[some])
+            end = float(on_axis[-1])
+            number = np.floor(on_axis / length + 1e-6).astype(np.int64)
+            change = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
+            values = _picked(part)[:, 2:]
+            numbers.append(number[change])
+            # As float32, of which an hour takes 60 MB.
+            lows.append(np.minimum.reduceat(values, change).astype(np.float32))
+            highs.append(np.maximum.reduceat(values, change).astype(np.float32))
+            first = (np.cumsum(part.rows) - part.rows)[some]
+            kept = np.diff(before, prepend=-1.0) > 0.0  # the first block of each cut
+            kept[::16] = True
+            where = np.column_stack((on_axis[first], before, part.log_times[some]))
+            places.append(where[kept])
             passed += len(part.rows)
-            self._show_reading(passed / expected if expected else last / max(self._end, 1e-9))
+            self._show_reading(passed / expected if expected else end / max(self._end, 1e-9))
         self._places, self._only_glanced = np.concatenate(places), False
         self._low, self._high = np.concatenate(lows), np.concatenate(highs)
         self._times = np.concatenate(numbers).astype(float) * length
-        self._end = last
+        self._end = end
         self._board.put('reading', f'What happened is sought in all {self._size:.0f} MB.')
         damage = '; '.join(f'{d.file.name}: {d.reason}' for d in self._run.damage)
         self._show(f'Not all can be read: {damage}.' if damage else '')
@@ -298,7 +293,7 @@ class RecordedRun:
         self._board.put('path', [[t, c.spindle_speed_rpm, c.depth_of_cut] for t, c in points])
 
 
-def _picked(part: Any) -> Array:
+def _picked(part: SampleBlocks) -> Array:
     """The COLUMNS of some blocks (n, 6), nan where there is no such column."""
     none = np.full(part.times.size, np.nan)
     rows = [part.signals[part.columns.index(n)] if n in part.columns else none for n in COLUMNS]
