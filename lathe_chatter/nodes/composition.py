@@ -102,13 +102,13 @@ class Cell:
             for node in self._nodes:
                 stack.callback(node.destroy_node)
 
-    def spin(self, executor: Executor, ended: Callable[[], bool]) -> None:
-        """Serve all three until `ended` says so."""
-        polled = [
-            Served(make_executor(node), node, _SERVE_PERIOD)
-            for node in (self.monitor, self.recorder)
-        ]
-        spin_together([Served(executor, self.lathe), *polled], ended)
+
+def _spin(executor: Executor, cell: Cell, ended: Callable[[], bool]) -> None:
+    """Serve all three until `ended` says so."""
+    polled = [
+        Served(make_executor(node), node, _SERVE_PERIOD) for node in (cell.monitor, cell.recorder)
+    ]
+    spin_together([Served(executor, cell.lathe), *polled], ended)
 
 
 def main() -> None:
@@ -124,9 +124,6 @@ def main() -> None:
         cells.append(Cell(own))
         return cells[0]
 
-    def spin(executor: Executor, cell: Cell, ended: Callable[[], bool]) -> None:
-        cell.spin(executor, ended)
-
-    run_node(make, MEMBERS, spin=spin, usage=USAGE)
+    run_node(make, MEMBERS, spin=_spin, usage=USAGE)
     if cells and cells[0].recorder.failed:
         raise SystemExit(1)

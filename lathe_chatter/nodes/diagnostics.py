@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from lathe_chatter.nodes.qos_overrides import publisher_overrides
+from lathe_chatter.nodes.parameter_node import ParameterNode
 
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
 ERROR, STALE = DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 
-_TOPIC = '/diagnostics'
 _MAX_NODES = 1000
 """Nodes whose statuses are kept: anybody may make up names."""
 
@@ -48,18 +46,13 @@ class Diagnostics:
         hardware: What they are about.
     """
 
-    def __init__(self, node: Node, hardware: str) -> None:
+    def __init__(self, node: ParameterNode, hardware: str) -> None:
         """Create the publisher."""
         self._node = node
         self._name = node.get_fully_qualified_name()
         self._hardware = self._name.rpartition('/')[0].lstrip('/')
         self._hardware = f'{self._hardware} {hardware}'.strip()
-        self._publisher = node.create_publisher(
-            DiagnosticArray,
-            _TOPIC,
-            QoSProfile(depth=10),
-            qos_overriding_options=publisher_overrides(node, _TOPIC),
-        )
+        self._publisher = node.offer(DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         self._shown: list[tuple[str, bytes, str]] = []
 
     def publish(self, statuses: Iterable[Status]) -> None:

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
 
+from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.remote_parameters import CONTACT, RemoteParameters
 
 _DEPTH = 'depth_of_cut'
@@ -29,18 +28,20 @@ class LatheCutWatch:
     """
 
     def __init__(
-        self, node: Node, on_depth: Callable[[float], None], on_contact: Callable[[], None]
+        self,
+        node: ParameterNode,
+        on_depth: Callable[[float], None],
+        on_contact: Callable[[], None],
     ) -> None:
         """Nothing is known yet."""
         self._on_depth, self._on_contact = on_depth, on_contact
         self._depth = math.nan
         self._parameters = RemoteParameters(node, self._take)
-        service = node.resolve_service_name('lathe/get_parameters')
-        self._lathe = service.removesuffix('/get_parameters')
+        self._lathe = node.full_name_of('lathe')
         node.create_subscription(
             ParameterEvent, '/parameter_events', self._on_event, QoSProfile(depth=100)
         )
-        node.create_timer(1.0, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.every(1.0, self._look)
 
     def forget(self) -> None:
         """It may be another lathe."""

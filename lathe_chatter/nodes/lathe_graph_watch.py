@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import time
 
-from rclpy.node import Node
-
 from lathe_chatter.nodes.diagnostics import OK, WARN, Status
-from lathe_chatter.nodes.log_rate_limit import BoundedLog
+from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.polled_subscription import publisher_names
 from lathe_chatter.nodes.real_time_loop import SECOND
 
@@ -20,14 +18,14 @@ class ClockWatch:
 
     Args:
         node: The lathe.
-        log: Of it.
         follows: Whether it cuts the time of /clock.
         drives: Whether it publishes it.
     """
 
-    def __init__(self, node: Node, log: BoundedLog, *, follows: bool, drives: bool) -> None:
+    def __init__(self, node: ParameterNode, *, follows: bool, drives: bool) -> None:
         """Nothing is seen yet."""
-        self._node, self._log, self._follows, self._drives = node, log, follows, drives
+        self._node, self._log = node, node.bounded_log
+        self._follows, self._drives = follows, drives
         self._stands = self._told = False
         self._shown, self._since = 0, time.monotonic()
 
@@ -66,12 +64,11 @@ class PublisherWatch:
 
     Args:
         node: The lathe.
-        log: Of it.
     """
 
-    def __init__(self, node: Node, log: BoundedLog) -> None:
+    def __init__(self, node: ParameterNode) -> None:
         """Nobody is seen yet."""
-        self._node, self._log = node, log
+        self._node, self._log = node, node.bounded_log
         self._names: list[str] = []
 
     def look(self) -> None:

@@ -7,9 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
-
 from lathe_chatter.array_types import Array
 from lathe_chatter.errors import LatheChatterError, reason_of
 from lathe_chatter.lathe.change_and_knock_sentences import (
@@ -22,7 +19,8 @@ from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.lathe.doubts import doubts
 from lathe_chatter.model import Cut
 from lathe_chatter.nodes.diagnostics import ERROR, OK, Status
-from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
+from lathe_chatter.nodes.log_rate_limit import QuickLog
+from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.recording import LatheRun
 from lathe_chatter.recording.provenance import ended_by
 
@@ -37,17 +35,17 @@ class LatheRecord:
 
     Args:
         node: The lathe.
-        bounded_log: Its logger for what tells of the pace, which moves no sample.
-        values: Its parameters at the start.
 
     Raises:
         RunExistsError: If the folder of the run exists.
         LatheChatterError: If it cannot be made.
     """
 
-    def __init__(self, node: Node, bounded_log: BoundedLog, values: Mapping[str, Any]) -> None:
+    def __init__(self, node: ParameterNode) -> None:
         """Begin, at time zero."""
-        self._logger, self._bounded_log = QuickLog(node.get_logger()), bounded_log
+        values: Mapping[str, Any] = node.values
+        # What tells of the pace moves no sample: its log is bounded.
+        self._logger, self._bounded_log = QuickLog(node.get_logger()), node.bounded_log
         self._run: LatheRun | None = None
         self._folder, self._failure = values['record'], ''
         if self._folder:
@@ -57,8 +55,7 @@ class LatheRecord:
             except OSError as error:
                 said = f'record: the run {self._folder} cannot be made: {reason_of(error)}.'
                 raise LatheChatterError(said) from None
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            node.create_timer(_COMMIT_PERIOD, self._commit, clock=steady)
+            node.every(_COMMIT_PERIOD, self._commit)
         self._log(BEGINNING)
         config = recorded_config(values)
         self._setup, self._doubts = config.setup, list[str]()

@@ -7,7 +7,6 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
@@ -93,7 +92,7 @@ class LatheNode(ParameterNode):
         self._topics = LatheTopics(
             self, self._lathe.columns, values['tick_rate'], self._factor, publish_clock=drives
         )
-        self._record = LatheRecord(self, self.bounded_log, values)
+        self._record = LatheRecord(self)
 
         self._control = RunControl()
         self._awaited: int = values['await_readers']
@@ -103,10 +102,8 @@ class LatheNode(ParameterNode):
         tick = SECOND / values['tick_rate']
         self._pacer = Pacer(tick, self._factor or 1.0, keeps_all=self._follows)
         self._free = self._factor == 0.0
-        self._others = PublisherWatch(self, self.bounded_log)
-        self._clock_watch = ClockWatch(
-            self, self.bounded_log, follows=self._follows, drives=drives
-        )
+        self._others = PublisherWatch(self)
+        self._clock_watch = ClockWatch(self, follows=self._follows, drives=drives)
         self._meter = TickStatistics(self._pacer, tick, self.requests)
         self._real_time = RealTime(values['realtime_priority'])
         self._diagnostics = Diagnostics(self, 'virtual lathe')
@@ -114,11 +111,10 @@ class LatheNode(ParameterNode):
         if simulation_services.AVAILABLE:
             simulation_services.create_services(self)
         self.create_subscription(Float64, '~/knock', self._on_knock, QoSProfile(depth=_MAX_KNOCKS))
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._by_timer = by_timer or self._follows
         if self._by_timer:
-            self.create_timer(1.0 / values['tick_rate'], self.wake, clock=steady)
-        self.create_timer(1.0, self._report, clock=steady)
+            self.every(1.0 / values['tick_rate'], self.wake)
+        self.every(1.0, self._report)
         if self._awaited:
             self.bounded_log.info(f'Waiting for {self._awaited} readers of my samples.')
 

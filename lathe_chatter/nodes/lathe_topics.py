@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -16,7 +15,6 @@ from std_msgs.msg import Float64, Float64MultiArray
 from lathe_chatter.array_types import Array
 from lathe_chatter.nodes.joint_state_message import joint_states, time_message
 from lathe_chatter.nodes.parameter_node import ParameterNode
-from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.samples import SAMPLE_COLUMNS
 from lathe_chatter.samples.codec import encode_block, encode_number
 
@@ -78,20 +76,15 @@ class LatheTopics:
     ) -> None:
         """Create the publishers."""
         self._columns = columns
-
-        def publisher(kind: Any, topic: str, qos: QoSProfile) -> Publisher:
-            options = publisher_overrides(node, topic)
-            return node.create_publisher(kind, topic, qos, qos_overriding_options=options)
-
         in_real_time = max(10, round(_HISTORY * tick_rate))
         faster = round(in_real_time * factor) if factor else MAX_HISTORY
         deep = max(in_real_time, min(faster, MAX_HISTORY))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._samples = publisher(Float64MultiArray, '~/samples', kept)
+        self._samples = node.offer(Float64MultiArray, '~/samples', kept)
         # Bytes need none of what rclpy asks of a message at each call.
         self._publish_samples = self._samples.handle.publish_raw
         self._scalars = [
-            (publisher(Float64, topic, QoSProfile(depth=deep)), column)
+            (node.offer(Float64, topic, QoSProfile(depth=deep)), column)
             for topic, column in _SCALARS.items()
         ]
         # Without a /clock nobody knows simulated time: stamps are the node's then.
@@ -99,8 +92,8 @@ class LatheTopics:
         self._now = None if publish_clock or self._follows else node.get_clock().now
         self._log = node.bounded_log
         self.zero: int | None = None
-        self._joints = publisher(JointState, '~/joint_states', QoSProfile(depth=10))
-        self._clock = publisher(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
+        self._joints = node.offer(JointState, '~/joint_states', QoSProfile(depth=10))
+        self._clock = node.offer(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
         self._look_at = self._published_at = 0.0
         self._unread = 0  # ticks since every reader was known to have all of them
         self._size = 0  # bytes of the last

@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
-from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool, Float64, String
 
@@ -35,7 +33,6 @@ from lathe_chatter.nodes.monitor_sentences import (
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import MONITOR, ModelSource
-from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.real_time_loop import spin_in_ticks
 from lathe_chatter.nodes.remote_parameters import RemoteMachine
 from lathe_chatter.nodes.sample_receiver import SampleBatch, SampleSubscription, SendingPace
@@ -101,20 +98,19 @@ class MonitorNode(ParameterNode):
         self._heard_by_report = self._reported_at = -math.inf
         self._reported_lost, self._was_silent = 0, True
 
-        self._flag_publisher = self._publisher(Bool, 'chatter', _LATCHED)
-        self._state_publisher = self._publisher(String, 'state', _LATCHED)
+        self._flag_publisher = self.offer(Bool, '~/chatter', _LATCHED)
+        self._state_publisher = self.offer(String, '~/state', _LATCHED)
         self._figure_publishers = {
-            name: self._publisher(Float64, name, QoSProfile(depth=1000)) for name in FIGURES
+            name: self.offer(Float64, f'~/{name}', QoSProfile(depth=1000)) for name in FIGURES
         }
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))
         self._state_publisher.publish(String(data=self._state))
         self._subscription = SampleSubscription(self, self._complain)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._wake_at = time.monotonic_ns()
         if by_timer:
-            self.create_timer(_REST_ON_WATCH / 1e9, self.wake, clock=steady)
-        self.create_timer(1.0, self._report, clock=steady)
+            self.every(_REST_ON_WATCH / 1e9, self.wake)
+        self.every(1.0, self._report)
 
     # -- listening -------------------------------------------------------------------------
 
@@ -329,11 +325,6 @@ class MonitorNode(ParameterNode):
             if math.isfinite(value := float(getattr(estimate, name))):
                 self._figures[name] = value
                 self._figure_publishers[name].publish(Float64(data=value))
-
-    def _publisher(self, kind: Any, name: str, qos: QoSProfile) -> Publisher:
-        topic = f'~/{name}'
-        options = publisher_overrides(self, topic)
-        return self.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
     # -- diagnostics -----------------------------------------------------------------------
 

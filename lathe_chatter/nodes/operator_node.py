@@ -16,6 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
+from lathe_chatter.detection.estimate import RECOMMENDED_SPEED
 from lathe_chatter.errors import ScenarioFailedError
 from lathe_chatter.samples.codec import SampleDecoder
 from lathe_chatter.scenario import Scenario, Step
@@ -26,8 +27,7 @@ from lathe_chatter.supervisor import ASKS
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_RECOMMENDED = 'recommended_speed_rpm'
-_ESTIMATES = ('growth_rate', 'frequency', 'amplitude', _RECOMMENDED)
+_ESTIMATES = ('growth_rate', 'frequency', RECOMMENDED_SPEED)
 
 
 class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on Jazzy
@@ -41,7 +41,6 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
     Attributes:
         scenario: What is played.
         time: Simulated time of the newest sample, s.
-        amplitude: Largest displacement of the tool in the newest block of samples, m.
         state: The monitor's word for the cut.
         player: Knows what is due, and what the monitor has said.
         failure: Why the scenario cannot go on, or None.
@@ -90,7 +89,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
         samples, columns = self._decoder.decode(data)
         self.time = float(samples[-1, columns.index('time')])
         if self.playing and not self._in_flight:
-            step = self.player.due(self.time, self._estimates[_RECOMMENDED])
+            step = self.player.due(self.time, self._estimates[RECOMMENDED_SPEED])
             if step is not None:
                 self._play(step)
 
@@ -114,7 +113,7 @@ class Operator(Node):  # type: ignore[misc]  # rclpy has no type information on 
             self.time, known['frequency'], known['growth_rate'], up=message.data
         )
         if what and message.data:  # what was recommended before was for another chatter
-            self._estimates[_RECOMMENDED] = math.nan
+            self._estimates[RECOMMENDED_SPEED] = math.nan
         if what:
             self._log(f'{self.time:7.2f} s  {what}')
 

@@ -16,6 +16,8 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 
 from lathe_chatter.errors import ParameterError, UnknownParameterError
 from lathe_chatter.model.parameter_table import ParameterTable, Value
@@ -23,6 +25,7 @@ from lathe_chatter.nodes.command_line_parameters import OF_QOS, OF_RCLPY
 from lathe_chatter.nodes.log_rate_limit import BoundedLog, QuickLog
 from lathe_chatter.nodes.parameter_descriptor import descriptor_of
 from lathe_chatter.nodes.polled_subscription import is_polled
+from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.real_time_loop import RequestLoad
 
 _SET_SERVICES = (SetParameters, SetParametersAtomically)
@@ -58,6 +61,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         self.set_together: frozenset[str] = frozenset()
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
         self.bounded_log = BoundedLog(QuickLog(self.get_logger()))
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         if hasattr(self.context, 'untrack_node'):
             # From Kilted on a context ends its nodes, one too whose making was given up half-way.
             self.context.untrack_node(self)
@@ -69,9 +73,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                 self.declare_parameter(row.name, value, descriptor_of(row), ignore_override=True)
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._accept)
-        self.create_timer(
-            1.0, self.bounded_log.look, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self.every(1.0, self.bounded_log.look)
 
     @property
     def values(self) -> Mapping[str, Value]:
@@ -105,6 +107,19 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
                 self.bounded_log.end()
         finally:
             super().destroy_node()
+
+    def every(self, period: float, task: Callable[[], object]) -> None:
+        """Have something done again and again, each s of a clock that nobody sets."""
+        self.create_timer(period, task, clock=self._steady)
+
+    def offer(self, kind: Any, topic: str, qos: QoSProfile) -> Publisher:
+        """A publisher, of whose quality of service the user may choose some at the start."""
+        options = publisher_overrides(self, topic)
+        return self.create_publisher(kind, topic, qos, qos_overriding_options=options)
+
+    def full_name_of(self, name: str) -> str:
+        """Of a node beside this one, which is remapped as its topics are."""
+        return str(self.resolve_service_name(f'{name}/get_parameters')).rpartition('/')[0]
 
     def announce(self) -> None:
         """Publish every parameter of the table as an event again.

@@ -95,13 +95,11 @@ class Pacer:
         """Whether the clock has gone back, and so has to be started again."""
         return self.lateness(now) < -self.period
 
-    def skip(self, now: int) -> float:
-        """Give up all that is due: the clock has jumped; how much that was, ns of the clock."""
-        skipped = self.lateness(now)
-        self.lag += skipped
+    def skip(self, now: int) -> None:
+        """Give up all that is due: the clock has jumped."""
+        self.lag += self.lateness(now)
         self.overruns += 1
         self.start(now)
-        return skipped
 
     def change(self, factor: float, now: int) -> None:
         """Go on with another factor, as late as it is."""

@@ -10,16 +10,15 @@ from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Status
 from lathe_chatter.nodes.log_rate_limit import BoundedLog
 from lathe_chatter.nodes.polled_subscription import publisher_names, several_publish
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
-from lathe_chatter.nodes.recorder_topic_selection import TopicWatch
+from lathe_chatter.nodes.recorder_topic_selection import Sink, TopicWatch
 from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.recorder_stalls import ReceiveStalls
 from lathe_chatter.recording.recording_statistics import Discontinuity, RunLog, SamplesReceived
-from lathe_chatter.recording.snapshot import SnapshotBuffer
 from lathe_chatter.samples.continuity import BlockOrder
 
 
 def recording_status(
-    sink: RunWriter | SnapshotBuffer | None,
+    sink: Sink | None,
     failure: str,
     watch: TopicWatch | None,
     log: RunLog,

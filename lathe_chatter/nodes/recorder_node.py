@@ -7,7 +7,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from lathe_chatter.errors import LatheChatterError, RecordingFailedError, reason_of
@@ -19,7 +18,7 @@ from lathe_chatter.nodes.real_time_loop import Schedule, spin_in_ticks
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic
 from lathe_chatter.nodes.recorder_diagnostics import log_news, mixture, recording_status
 from lathe_chatter.nodes.recorder_parameters import RECORDER
-from lathe_chatter.nodes.recorder_topic_selection import TopicWatch, selection
+from lathe_chatter.nodes.recorder_topic_selection import Sink, TopicWatch, selection
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.run_folders import RunFolders
 from lathe_chatter.nodes.simulation_control import Answer
@@ -91,9 +90,8 @@ class RecorderNode(ParameterNode):
         )
         self._schedule = Schedule(*tasks)
         if by_timer:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
             for period, task in tasks:
-                self.create_timer(period, task, clock=steady)
+                self.every(period, task)
 
     def next_wake(self) -> int:
         """When it works next, ns of time.monotonic_ns()."""
@@ -122,8 +120,8 @@ class RecorderNode(ParameterNode):
         return None if self._writer is None else self._writer.folder
 
     @property
-    def _sink(self) -> RunWriter | SnapshotBuffer | None:
-        """What takes the messages: a run, or the memory of the last seconds."""
+    def _sink(self) -> Sink | None:
+        """What takes the messages."""
         return self._writer if self._snapshot is None else self._snapshot
 
     @property
@@ -138,10 +136,6 @@ class RecorderNode(ParameterNode):
     def lost_of(self, name: str) -> int:
         """How many of its messages are known to be missing."""
         return self._topics[name].lost if name in self._topics else 0
-
-    def parameters_noted(self, node: str) -> bool:
-        """Whether the parameters of a node, by its full name, are in the run."""
-        return node in self._noted
 
     def start(self) -> Path | None:
         """Begin a run, or to keep the last seconds; the folder of the run, if there is one.
@@ -176,7 +170,7 @@ class RecorderNode(ParameterNode):
         self._look()
         return self.run
 
-    def _attach(self, sink: RunWriter | SnapshotBuffer, file: Path) -> None:
+    def _attach(self, sink: Sink, file: Path) -> None:
         try:
             sink.attach_file(file)
         except OSError as error:

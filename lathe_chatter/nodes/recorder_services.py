@@ -3,46 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.log_rate_limit import BoundedLog
-from lathe_chatter.nodes.simulation_control import Answer
+from lathe_chatter.nodes.simulation_control import Answer, answering
+
+if TYPE_CHECKING:
+    from lathe_chatter.nodes.recorder_node import RecorderNode
 
 
-class Recorder(Protocol):
-    """What the services drive: these requests, on a node of rclpy."""
-
-    def start(self) -> Path | None:
-        """Begin a run; LatheChatterError where that cannot be."""
-
-    def stop(self) -> Answer:
-        """Finish the run."""
-
-    def split(self) -> Answer:
-        """Go on in a new file."""
-
-    def snapshot(self, reason: str) -> Answer:
-        """Write what is in memory."""
-
-    def pause(self, *, pause: bool) -> Answer:
-        """Leave out what comes, or no longer."""
-
-    @property
-    def bounded_log(self) -> BoundedLog:
-        """Where to say what was done."""
-
-    def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
-        """Create a service."""
-
-
-def create_services(recorder: Recorder) -> None:
+def create_services(recorder: RecorderNode) -> None:
     """Create the services on a node."""
 
-    def start() -> Answer:
+    def start(_request: Any) -> Answer:
         try:
             folder = recorder.start()
         except LatheChatterError as error:
@@ -50,25 +25,20 @@ def create_services(recorder: Recorder) -> None:
         said = 'Keeping the last in memory.' if folder is None else f'Recording into {folder}.'
         return Answer(done=True, message=said)
 
-    def answering(act: Callable[[], Answer]) -> Callable[[Any, Any], Any]:
-        def answer(_request: Any, response: Any) -> Any:
-            response.success, response.message = act()
-            if response.success and act is not start:  # which has said so itself
-                recorder.bounded_log.info(response.message, 'asked')
-            return response
+    def logged(act: Callable[[], Answer]) -> Callable[[Any], Answer]:
+        def act_and_log(_request: Any) -> Answer:
+            answer = act()
+            if answer.done:
+                recorder.bounded_log.info(answer.message, 'asked')
+            return answer
 
-        return answer
+        return act_and_log
 
-    def pause(request: Any, response: Any) -> Any:
-        response.success, response.message = recorder.pause(pause=request.data)
-        return response
-
-    requests = {
-        'start': start,
-        'stop': recorder.stop,
-        'split': recorder.split,
-        'snapshot': lambda: recorder.snapshot('It was asked for.'),
-    }
-    for name, act in requests.items():
-        recorder.create_service(Trigger, f'~/{name}', answering(act))
-    recorder.create_service(SetBool, '~/pause', pause)
+    for kind, name, act in (
+        (Trigger, 'start', start),  # which says so itself
+        (Trigger, 'stop', logged(recorder.stop)),
+        (Trigger, 'split', logged(recorder.split)),
+        (Trigger, 'snapshot', logged(lambda: recorder.snapshot('It was asked for.'))),
+        (SetBool, 'pause', lambda request: recorder.pause(pause=request.data)),
+    ):
+        recorder.create_service(kind, f'~/{name}', answering(act))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import re
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -18,8 +17,9 @@ from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic, Write, topic_of
 from lathe_chatter.nodes.recorder_parameters import RECORDED_TOPICS
 from lathe_chatter.nodes.topic_types import MissingTypeError, message_type
-from lathe_chatter.recording import Topic
+from lathe_chatter.recording import RunWriter
 from lathe_chatter.recording.provenance import PUBLISHERS
+from lathe_chatter.recording.snapshot import SnapshotBuffer
 
 ALWAYS = ('/rosout', '/parameter_events')
 """Topics that are recorded in a pause as well: without them its end would be a riddle."""
@@ -31,18 +31,8 @@ _EXPECTED = 5.0
 """s after the start of a recording by which somebody publishes what was asked for by name."""
 
 
-class Sink(Protocol):
-    """Where a recording goes: into a run, or into the memory of a snapshot."""
-
-    @property
-    def repeated(self) -> Counter[str]:
-        """Messages that a file begins with because one before had them, by name of topic."""
-
-    def add_topic(self, topic: Topic) -> None:
-        """Announce a topic."""
-
-    def note(self, name: str, values: dict[str, str]) -> None:
-        """Keep named values."""
+Sink = RunWriter | SnapshotBuffer
+"""Where a recording goes: into a run, or into the memory of the last seconds."""
 
 
 class Selection(NamedTuple):

@@ -158,8 +158,7 @@ class RemoteMachine:
         """Nothing is asked yet."""
         self._node, self._on_machine = node, on_machine
         self._parameters = RemoteParameters(node, self._take)
-        service = node.resolve_service_name('lathe/get_parameters')
-        self._lathe = service.removesuffix('/get_parameters')
+        self._lathe = node.full_name_of('lathe')
         self.answered = False
         self._awaited_since = math.inf
 

@@ -9,7 +9,6 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Float64MultiArray
 
 from lathe_chatter.array_types import Array
@@ -71,10 +70,6 @@ class SampleSubscription:
             QoSOverridingOptions.with_default_policies(),
         )
 
-    def _endpoints(self) -> list[TopicEndpointInfo]:
-        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self.topic)
-        return found
-
     def remember_publishers(self) -> None:
         """Remember who publishes now."""
         self._known = self._messages.publishers()
@@ -89,7 +84,8 @@ class SampleSubscription:
 
     def adapt(self) -> bool:
         """Ask for no more than every publisher offers; whether that made a difference."""
-        offered = {each.qos_profile.reliability for each in self._endpoints()}
+        offers = self._node.get_publishers_info_by_topic(self.topic)
+        offered = {offer.qos_profile.reliability for offer in offers}
         if self.best_effort or ReliabilityPolicy.BEST_EFFORT not in offered:
             return False
         self._waiting += self._read()

@@ -9,10 +9,14 @@ any of them -- the guard trips --> ENDED -- reset --> as it was before, RUNNING 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from std_srvs.srv import SetBool, Trigger
+
+if TYPE_CHECKING:
+    from lathe_chatter.nodes.lathe_node import LatheNode
 
 
 class RunState(str, Enum):
@@ -80,45 +84,21 @@ class RunControl:
         return Answer(done=True, message=f'At time zero again, {self.state.value}.')
 
 
-class Simulator(Protocol):
-    """What the services of control drive: these requests, on a node of rclpy."""
+def answering(act: Callable[[Any], Answer]) -> Callable[[Any, Any], Any]:
+    """The callback of a service of std_srvs that does something, and says what it came to."""
 
-    @property
-    def run_state(self) -> RunState:
-        """Whether simulated time goes on."""
+    def answer(request: Any, response: Any) -> Any:
+        response.success, response.message = act(request)
+        return response
 
-    @property
-    def samples_taken(self) -> int:
-        """0 at time zero."""
-
-    def pause(self, *, pause: bool) -> Answer:
-        """Pause or go on."""
-
-    def step(self, ticks: int = 1) -> Answer:
-        """Make ticks while paused."""
-
-    def reset(self) -> Answer:
-        """Start again at time zero."""
-
-    def create_service(self, srv_type: Any, srv_name: str, callback: Any) -> Any:
-        """Create a service."""
+    return answer
 
 
-def create_services(simulator: Simulator) -> None:
+def create_services(lathe: LatheNode) -> None:
     """Create `~/pause`, `~/step` and `~/reset`, in std_srvs: what every graph has."""
-
-    def pause(request: Any, response: Any) -> Any:
-        response.success, response.message = simulator.pause(pause=request.data)
-        return response
-
-    def step(_request: Any, response: Any) -> Any:
-        response.success, response.message = simulator.step()
-        return response
-
-    def reset(_request: Any, response: Any) -> Any:
-        response.success, response.message = simulator.reset()
-        return response
-
-    simulator.create_service(SetBool, '~/pause', pause)
-    simulator.create_service(Trigger, '~/step', step)
-    simulator.create_service(Trigger, '~/reset', reset)
+    for kind, name, act in (
+        (SetBool, 'pause', lambda request: lathe.pause(pause=request.data)),
+        (Trigger, 'step', lambda _request: lathe.step()),
+        (Trigger, 'reset', lambda _request: lathe.reset()),
+    ):
+        lathe.create_service(kind, f'~/{name}', answering(act))

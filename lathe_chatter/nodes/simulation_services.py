@@ -6,9 +6,9 @@ simulator know. STOPPED is paused at time zero; a run that its guard has ended r
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from lathe_chatter.nodes.simulation_control import Answer, RunState, Simulator
+from lathe_chatter.nodes.simulation_control import Answer, RunState
 
 try:
     from simulation_interfaces.msg import Result, SimulationState, SimulatorFeatures
@@ -24,27 +24,28 @@ except ImportError:
 else:
     AVAILABLE = True
 
+if TYPE_CHECKING:
+    from lathe_chatter.nodes.lathe_node import LatheNode
+
 MAX_STEPS = 100_000
 """Ticks in one request: more would leave other requests unanswered for too long."""
 
 
-def create_services(simulator: Simulator) -> None:
+def create_services(lathe: LatheNode) -> None:
     """Create the services on a node."""
-    services = _Services(simulator)
-    simulator.create_service(
-        GetSimulatorFeatures, '~/get_simulator_features', services.get_features
-    )
-    simulator.create_service(GetSimulationState, '~/get_simulation_state', services.get_state)
-    simulator.create_service(SetSimulationState, '~/set_simulation_state', services.set_state)
-    simulator.create_service(StepSimulation, '~/step_simulation', services.step)
-    simulator.create_service(ResetSimulation, '~/reset_simulation', services.reset)
+    services = _Services(lathe)
+    lathe.create_service(GetSimulatorFeatures, '~/get_simulator_features', services.get_features)
+    lathe.create_service(GetSimulationState, '~/get_simulation_state', services.get_state)
+    lathe.create_service(SetSimulationState, '~/set_simulation_state', services.set_state)
+    lathe.create_service(StepSimulation, '~/step_simulation', services.step)
+    lathe.create_service(ResetSimulation, '~/reset_simulation', services.reset)
 
 
 class _Services:
     """The callbacks."""
 
-    def __init__(self, simulator: Simulator) -> None:
-        self._simulator = simulator
+    def __init__(self, lathe: LatheNode) -> None:
+        self._lathe = lathe
 
     def get_features(self, _request: Any, response: Any) -> Any:
         """What of the standard is supported."""
@@ -79,10 +80,10 @@ class _Services:
             result.error_message = 'A lathe that is stopped cannot be paused, only played.'
             return response
         if wanted == SimulationState.STATE_STOPPED:
-            self._simulator.reset()
-            answer = self._simulator.pause(pause=True)
+            self._lathe.reset()
+            answer = self._lathe.pause(pause=True)
         elif wanted in {SimulationState.STATE_PLAYING, SimulationState.STATE_PAUSED}:
-            answer = self._simulator.pause(pause=wanted == SimulationState.STATE_PAUSED)
+            answer = self._lathe.pause(pause=wanted == SimulationState.STATE_PAUSED)
         else:
             result.result = Result.RESULT_FEATURE_UNSUPPORTED
             result.error_message = 'A lathe can be playing, paused or stopped.'
@@ -98,23 +99,23 @@ class _Services:
             result.result = Result.RESULT_OPERATION_FAILED
             result.error_message = f'At most {MAX_STEPS} ticks in one request.'
             return response
-        _report(result, self._simulator.step(request.steps), Result.RESULT_OPERATION_FAILED)
+        _report(result, self._lathe.step(request.steps), Result.RESULT_OPERATION_FAILED)
         return response
 
     def reset(self, request: Any, response: Any) -> Any:
         """Time and state at once, for neither makes sense alone."""
         both = ResetSimulation.Request.SCOPE_TIME | ResetSimulation.Request.SCOPE_STATE
         if request.scope == ResetSimulation.Request.SCOPE_DEFAULT or request.scope & both == both:
-            _report(response.result, self._simulator.reset(), Result.RESULT_OPERATION_FAILED)
+            _report(response.result, self._lathe.reset(), Result.RESULT_OPERATION_FAILED)
         else:
             response.result.result = Result.RESULT_FEATURE_UNSUPPORTED
             response.result.error_message = 'Time and state of a lathe are reset together.'
         return response
 
     def _state(self) -> int:
-        if self._simulator.run_state is RunState.RUNNING:
+        if self._lathe.run_state is RunState.RUNNING:
             return int(SimulationState.STATE_PLAYING)
-        at_zero = self._simulator.samples_taken == 0
+        at_zero = self._lathe.samples_taken == 0
         return int(SimulationState.STATE_STOPPED if at_zero else SimulationState.STATE_PAUSED)
 
 

@@ -12,7 +12,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
@@ -38,7 +37,6 @@ from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
 from lathe_chatter.nodes.polled_subscription import PolledSubscription, publisher_marks
-from lathe_chatter.nodes.qos_overrides import publisher_overrides
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.supervisor_limits import limits_from, unsuited
 from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
@@ -99,10 +97,7 @@ class SupervisorNode(ParameterNode):
         self._newest = 'nothing was done yet'
         self._set = self.create_client(SetParametersAtomically, 'lathe/set_parameters_atomically')
         self._pause = self.create_client(SetBool, 'lathe/pause')
-        self._lathe, self._monitor = (
-            self.resolve_service_name(f'{name}/get_parameters').rpartition('/')[0]
-            for name in ('lathe', 'chatter_monitor')
-        )
+        self._lathe, self._monitor = map(self.full_name_of, ('lathe', 'chatter_monitor'))
         self._core = self._new_core()
         self._remote = RemoteParameters(self, self._take_parameters)
         for name in HEARD:
@@ -115,15 +110,11 @@ class SupervisorNode(ParameterNode):
         ):
             self.create_subscription(kind, topic, hear, qos)
         self._flags = PolledSubscription(self, Bool, 'chatter_monitor/chatter', _LATCHED)
-        topic = '~/action'
-        self._action = self.create_publisher(
-            String, topic, _SENTENCES, qos_overriding_options=publisher_overrides(self, topic)
-        )
+        self._action = self.offer(String, '~/action', _SENTENCES)
         self._diagnostics = Diagnostics(self, 'chatter supervisor')
         self.create_service(Trigger, '~/accept', self._on_accept)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self._look, clock=steady)
-        self.create_timer(1.0, self._report, clock=steady)
+        self.every(_LOOK_PERIOD, self._look)
+        self.every(1.0, self._report)
 
     def _refusal(self, parameters: list[Parameter]) -> str:
         """Also where limits would contradict each other."""

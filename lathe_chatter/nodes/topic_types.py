@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rclpy.topic_endpoint_info import TopicEndpointInfo
-from rosbags.typesys import Stores, get_typestore
+
+from lathe_chatter.recording.ros_messages import types
 
 _SEPARATOR = f'{"=" * 80}\nMSG: '
 
@@ -65,17 +66,12 @@ def _message_class(name: str) -> Any:
 
 
 @cache
-def _store() -> Any:
-    return get_typestore(Stores.ROS2_JAZZY)
-
-
-@cache
 def _known_definition(name: str) -> tuple[str, str]:
     """Definition and hash of a type that rosbags knows, else empty."""
-    if name not in _store().fielddefs:
+    if name not in types().fielddefs:
         return '', ''
-    definition, _ = _store().generate_msgdef(name, ros_version=2)
-    return definition, _store().hash_rihs01(name)
+    definition, _ = types().generate_msgdef(name, ros_version=2)
+    return definition, types().hash_rihs01(name)
 
 
 @cache

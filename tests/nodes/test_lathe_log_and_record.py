@@ -32,7 +32,7 @@ def test_both_ways_to_record_give_equal_arrays_that_can_be_computed_again(
     recorder = start(RecorderNode, output=str(tmp_path / 'heard'))
     lathe = start(LatheNode, record=str(tmp_path / 'own'), tick_rate=100, seed=11)
     knock = bench.talk(Float64, '/lathe/knock')
-    spin_until(lambda: recorder.parameters_noted('/lathe'), 'the parameters')
+    spin_until(lambda: '/lathe' in recorder._noted, 'the parameters')
     spin_until(lambda: recorder.messages_of('/rosout') > 0, 'the log')
     assert bench.set_together('/lathe', depth_of_cut=0.0007, force_noise=1e-3).successful
     knock.publish(Float64(data=0.01 / 3.0))

@@ -242,7 +242,7 @@ def test_the_run_knows_who_made_it_and_the_parameters_of_the_lathe(
         topics=['lathe/samples'],
         attachments=[str(tmp_path / 'deep.yaml'), str(tmp_path / 'missing')],
     )
-    spin_until(lambda: recorder.parameters_noted('/lathe'), 'the parameters')
+    spin_until(lambda: '/lathe' in recorder._noted, 'the parameters')
     recorder.stop()
     run = read_run(tmp_path / 'run')
     (attached,) = run.attachments()
