@@ -12,7 +12,6 @@ from lathe_chatter.array_types import Array
 from lathe_chatter.model import Machine
 from lathe_chatter.plot_style import NEUTRAL, TOOL, WORKPIECE, grid, scale_for, widen
 from lathe_chatter.report.run_excerpts import Excerpt, Spectrum
-from lathe_chatter.report.run_history import History
 from lathe_chatter.stability import contact_at, root_of
 
 if TYPE_CHECKING:
@@ -35,9 +34,8 @@ _TOP_AT_REST = 1e-6
 """m: top of the empty spectrum of a cut at rest."""
 
 
-def draw_portrait(axes: Axes, history: History, excerpt: Excerpt) -> None:
+def draw_portrait(axes: Axes, excerpt: Excerpt) -> None:
     """Phase portraits of tool and workpiece."""
-    del history
     columns = excerpt.portrait
     pairs = {
         name: (columns[f'{name}_displacement'], columns[f'{name}_velocity'])
@@ -55,9 +53,8 @@ def draw_portrait(axes: Axes, history: History, excerpt: Excerpt) -> None:
     axes.legend(loc='upper center', frameon=False, fontsize=8, ncols=2)
 
 
-def draw_section(axes: Axes, history: History, excerpt: Excerpt) -> None:
+def draw_section(axes: Axes, excerpt: Excerpt) -> None:
     """Displacement and velocity once per turn: a point for what repeats with the spindle."""
-    del history
     sections = {name: tuple(excerpt.section(name)) for name, _, _ in _BODIES}
     _draw_plane(axes, excerpt, sections, lines=False)
     turns = len(sections['tool'][0])
@@ -65,9 +62,9 @@ def draw_section(axes: Axes, history: History, excerpt: Excerpt) -> None:
     axes.set_title(f'once per turn, {counted}', fontsize=10)
 
 
-def draw_spectrum(axes: Axes, history: History, excerpt: Excerpt) -> None:
+def draw_spectrum(axes: Axes, excerpt: Excerpt) -> None:
     """Amplitude spectra of both displacements, with the frequency that the root predicts."""
-    session = history.session_at(excerpt.until)
+    session = excerpt.session
     spectra = {name: excerpt.spectrum(f'{name}_displacement') for name, _, _ in _BODIES}
     contact = contact_at(session.machine, excerpt.cut, tool_leaves_cut=session.tool_leaves_cut)
     root = root_of(session.machine, excerpt.cut, seated=contact.seated)
@@ -122,7 +119,7 @@ def _draw_plane(
     least = max(
         _FAINTEST, *(_LEAST * float(np.abs(x).max(initial=0.0)) for x, _ in pairs.values())
     )
-    modes = (*excerpt.machine.tool.modes, *excerpt.machine.workpiece.modes)
+    modes = (*excerpt.session.machine.tool.modes, *excerpt.session.machine.workpiece.modes)
     least_velocity = least * min(mode.natural_frequency for mode in modes)
     places = scale_for('m', least, *(pair[0] for pair in pairs.values()))
     speeds = scale_for('m/s', least_velocity, *(pair[1] for pair in pairs.values()))

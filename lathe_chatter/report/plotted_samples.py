@@ -5,12 +5,12 @@ A run may have more samples than fit into memory; they are passed by and never h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.samples.continuity import Continuity
 from lathe_chatter.samples.extremes import TIME, Extremes
 
@@ -18,18 +18,6 @@ Spans = Sequence[tuple[float, float]]
 """Begin and end of each, s."""
 _AT_ONCE = 50_000
 """Samples that are looked at together: more would only take more memory."""
-
-
-class SampleBlocks(Protocol):
-    """Some blocks of samples that follow each other in a record."""
-
-    @property
-    def columns(self) -> Sequence[str]:
-        """Names of the signals."""
-
-    @property
-    def samples(self) -> Array:
-        """All samples (n, k)."""
 
 
 class RunSamples:
@@ -56,7 +44,7 @@ class RunSamples:
         continuity = Continuity(remember=True)
         self.extremes = Extremes.none((TIME,))
         for block in blocks(()):
-            samples, columns = block.samples, tuple(block.columns)
+            samples, columns = block.samples, block.columns
             if not len(samples):
                 continue
             if not continuity.samples:
@@ -69,13 +57,6 @@ class RunSamples:
         self.count, self.last = continuity.samples, continuity.last or 0.0
         self.gaps, self.restarts = continuity.gap_places, continuity.restart_places
         self.step = continuity.step
-
-    @classmethod
-    def of(cls, signals: Mapping[str, Array]) -> RunSamples:
-        """Of signals (n,) by name that are in memory already."""
-        samples = np.column_stack(list(signals.values()))
-        block = _InMemory(tuple(signals), samples)
-        return cls(lambda _spans: [block])
 
     def between(self, spans: Spans) -> list[dict[str, Array]]:
         """Every sample within some spans of simulated time: after the begin, up to the end.
@@ -93,8 +74,7 @@ class RunSamples:
         parts: list[list[Array]] = [[] for _ in spans]
         columns = self.extremes.columns
         for block in self._blocks(whole):
-            names = tuple(block.columns)
-            times = block.samples[:, names.index(TIME)]
+            names, times = block.columns, block.times
             if not len(times):
                 continue
             for (begin, end), part in zip(whole, parts, strict=True):
@@ -110,8 +90,3 @@ class RunSamples:
         inside = [after for _, after in (*self.gaps, *self.restarts) if begin < after <= end]
         # The first sample after the gap belongs to it.
         return max([begin, *(after - 0.5 * self.step for after in inside)])
-
-
-class _InMemory(NamedTuple):
-    columns: tuple[str, ...]
-    samples: Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lathe_chatter.array_types import Array
 from lathe_chatter.model import BearingContact, Cut, Machine
-from lathe_chatter.report.run_history import History
+from lathe_chatter.report.run_history import History, Session
 
 _LONGEST = 207.0
 """Periods of the lowest mode that an excerpt has at most; of the paper's machine, 2 s."""
@@ -62,19 +62,19 @@ class Excerpt:
         until: Simulated time, s.
         cut: In force.
         samples: By name of column.
-        machine: That cut: what is long depends on it.
+        session: Of which it is.
     """
 
     title: str
     until: float
     cut: Cut
     samples: dict[str, Array]
-    machine: Machine = field(default_factory=Machine)
+    session: Session
 
     @property
     def portrait(self) -> dict[str, Array]:
         """The last periods, for a phase portrait."""
-        inside = self.samples['time'] > self.until - _PORTRAIT * _period(self.machine)
+        inside = self.samples['time'] > self.until - _PORTRAIT * _period(self.session.machine)
         return {name: values[inside] for name, values in self.samples.items()}
 
     def size(self, name: str) -> float:
@@ -93,7 +93,7 @@ class Excerpt:
         contact, gap = self.cut.bearing_contact, self.cut.bearing_clearance
         if contact in {BearingContact.NONE, BearingContact.SEATED}:
             return float(contact is BearingContact.SEATED)
-        if not clearance_is_seen(self.cut, self.machine):
+        if not clearance_is_seen(self.cut, self.session.machine):
             return math.nan
         place = self.portrait['workpiece_displacement']
         return _share((np.abs(place) if contact is BearingContact.BOTH_SIDES else place) >= gap)
@@ -129,7 +129,7 @@ def excerpts_of(history: History) -> list[Excerpt]:
     """Two or three that are worth a closer look: before anything happened, chatter, the end."""
     end = history.duration
     disturbances = _disturbances(history)
-    periods = _PORTRAIT * _period(history.machine)
+    periods = _PORTRAIT * _period(history.sessions[0].machine)
     first = disturbances[0] if disturbances else min(history.begin + periods, end)
     wanted = [('before the first change' if disturbances else 'at the start', first)]
     spans = [span for span in history.chatter_spans() if span[1] > history.begin]
@@ -145,8 +145,7 @@ def excerpts_of(history: History) -> list[Excerpt]:
     )
     return [
         Excerpt(
-            title, until, history.cut_at(0.5 * (begin + until)), signals,
-            history.session_at(until).machine,
+            title, until, history.cut_at(0.5 * (begin + until)), signals, history.session_at(until)
         )
         for (title, until), begin, signals in zip(wanted, begins, samples, strict=True)
     ]  # fmt: skip
@@ -154,10 +153,9 @@ def excerpts_of(history: History) -> list[Excerpt]:
 
 def _disturbances(history: History) -> list[float]:
     """When the cut was changed or knocked, or its spindle reached its speed, s."""
-    times = [change.time for change in history.changes] + [k.time for k in history.knocks]
-    times += [ramp.end for ramp in history.ramps]
-    times += [session.time for session in history.later_sessions]
-    return sorted({time for time in times if history.begin < time <= history.duration})
+    knocks = (knock.time for knock in history.knocks)
+    inside = {time for time in knocks if history.begin < time <= history.duration}
+    return sorted(history.edges | inside)
 
 
 def _undisturbed_since(history: History, until: float) -> float:

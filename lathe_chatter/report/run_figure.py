@@ -35,7 +35,7 @@ def draw_run(history: History, excerpts: Sequence[Excerpt], path: Path) -> None:
     for row, draw in ((4, draw_portrait), (5, draw_spectrum), (6, draw_section)):
         cells = rows[row].subgridspec(1, len(excerpts))
         for place, excerpt in enumerate(excerpts):
-            draw(figure.add_subplot(cells[place]), history, excerpt)
+            draw(figure.add_subplot(cells[place]), excerpt)
     beside = min(len(charts), _BESIDE)
     lines = [rows[k].subgridspec(1, beside) for k in range(7, len(heights))]
     for place, chart in enumerate(charts):

@@ -109,44 +109,35 @@ class History:
 
     Attributes:
         path: The folder of the run.
-        machine: As it was at the start.
-        start: The cut at the start.
+        sessions: One, and another for each reset and each new start.
         samples: Of the lathe.
         changes: Of the cut, in order.
         knocks: On the tool, in order.
         flags: Of the monitor, in order.
         estimates: Growth rate, frequency and so on by name: simulated times and values (2, m).
-        tool_leaves_cut: The force law, see `VirtualLathe`.
-        spindle_acceleration: rev/min per s; 0 where the speed steps.
-        later_sessions: After the first, one for each reset and each new start.
-        known: Whether the parameters at the start are in the record.
-        described: The machine file that the lathe was given, None where there was none.
         remarks: What else is to be known, sentences: steps of the clock, contradictions.
     """
 
     path: Path
-    machine: Machine
-    start: Cut
+    sessions: tuple[Session, ...]
     samples: RunSamples
     changes: list[Change] = field(default_factory=list)
     knocks: list[Knock] = field(default_factory=list)
     flags: list[Flag] = field(default_factory=list)
     estimates: dict[str, Array] = field(default_factory=dict)
-    tool_leaves_cut: bool = True
-    spindle_acceleration: float = 0.0
-    later_sessions: tuple[Session, ...] = ()
-    known: bool = True
-    described: MachineDescription | None = None
     remarks: list[str] = field(default_factory=list)
 
     @property
-    def sessions(self) -> tuple[Session, ...]:
-        """All, in order."""
-        first = Session(
-            0.0, '', self.machine, self.start, self.tool_leaves_cut, self.spindle_acceleration,
-            self.known, self.described,
-        )  # fmt: skip
-        return (first, *self.later_sessions)
+    def later_sessions(self) -> tuple[Session, ...]:
+        """After the first."""
+        return self.sessions[1:]
+
+    @property
+    def edges(self) -> set[float]:
+        """When the cut was changed or began anew, and when its spindle reached its speed, s."""
+        times = {change.time for change in self.changes} | {ramp.end for ramp in self.ramps}
+        times |= {session.time for session in self.later_sessions}
+        return {time for time in times if self.begin < time <= self.duration}
 
     def in_order(self) -> list[Event]:
         """What happened after the start, as it happened."""
@@ -174,7 +165,7 @@ class History:
 
     def speed_at(self, time: float) -> float:
         """The spindle speed that is reached at a simulated time, rev/min; without its swing."""
-        speed = self.start.spindle_speed_rpm
+        speed = self.sessions[0].start.spindle_speed_rpm
         for ramp in self.ramps:
             if time >= ramp.end:
                 speed = ramp.high
@@ -187,7 +178,7 @@ class History:
     def ramps(self) -> list[Ramp]:
         """Every change of the spindle speed in order; a step takes no time."""
         found: list[Ramp] = []
-        speed = self.start.spindle_speed_rpm
+        speed = self.sessions[0].start.spindle_speed_rpm
         ends = [*(session.time for session in self.later_sessions), math.inf]
         for session, end in zip(self.sessions, ends, strict=True):
             if session.time:
@@ -305,26 +296,19 @@ def read_history(path: Path, topic: str | None = None) -> History:
         [replace(event, time=event.time + session.time) for event in recorded.events]
         for session, recorded in zip(sessions, cuts.sampled, strict=True)
     ]
-    later = (
+    later = [
         session._replace(ended=tuple(event for event in before if event.time >= session.time))
         for session, before in zip(sessions[1:], told[:-1], strict=True)
-    )
+    ]
     events = [event for each in told for event in each]
-    first = sessions[0]
     return History(
         path=Path(path),
-        machine=first.machine,
-        start=first.start,
+        sessions=(sessions[0], *later),
         samples=RunSamples(lambda spans: _on_one_axis(run, topic, cuts, sessions, spans)),
         changes=[event for event in events if isinstance(event, Change)],
         knocks=[event for event in events if isinstance(event, Knock)],
         flags=monitor.flags(estimates),
         estimates=estimates,
-        tool_leaves_cut=first.tool_leaves_cut,
-        spindle_acceleration=first.spindle_acceleration,
-        later_sessions=tuple(later),
-        known=first.known,
-        described=first.described,
         remarks=_remarks(cuts, logger_of(topic.rsplit('/', 1)[0])),
     )
 
@@ -338,7 +322,8 @@ def _sessions(cuts: RecordedCuts) -> list[Session]:
         values = recorded.parameters or values
         sessions.append(
             Session(
-                time, _REASONS[recorded.beginning], machine_from(values), cut_from(values),
+                time, _REASONS[recorded.beginning] if sessions else '', machine_from(values),
+                cut_from(values),
                 bool(values.get('tool_leaves_cut', True)),
                 float(values.get('spindle_acceleration', 0.0)), bool(recorded.parameters),
                 described_by(values),

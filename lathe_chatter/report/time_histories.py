@@ -107,10 +107,7 @@ def _draw_signal(axes: Axes, history: History, name: str, unit: str, colour: str
 
 def _edges(history: History) -> list[float]:
     """Simulated times from one of which to the next the cut is one, or the spindle ramps, s."""
-    times = [change.time for change in history.changes] + [r.end for r in history.ramps]
-    times += [session.time for session in history.later_sessions]
-    inside = {time for time in times if history.begin < time < history.duration}
-    return sorted({history.begin, history.duration} | inside)
+    return sorted({history.begin, history.duration} | history.edges)
 
 
 def _draw_rates(axes: Axes, history: History) -> None:

@@ -72,7 +72,7 @@ def test_a_change_of_long_before_is_in_the_parameters_of_a_snapshot(tmp_path: Pa
     recorder.cut(lathe, 0.1)
     folder = recorder.save(tmp_path / 'run')
     history = read_history(folder)
-    assert history.start.depth_of_cut == 0.0007
+    assert history.sessions[0].start.depth_of_cut == 0.0007
     assert [change.new for change in history.changes] == [{'depth_of_cut': 0.0008}]
     assert not history.remarks
     (summary,) = [note.values for note in read_run(folder).notes() if note.name == SUMMARY]
@@ -93,4 +93,4 @@ def test_a_lathe_that_began_in_a_snapshot_has_its_own_parameters(tmp_path: Path)
     assert starts == [0.0004, 0.0006]
     recorder.cut(recorder.begin(depth_of_cut=0.0009), 2 * SECONDS)
     history = read_history(recorder.save(tmp_path / 'last'))
-    assert history.start.depth_of_cut == 0.0009
+    assert history.sessions[0].start.depth_of_cut == 0.0009

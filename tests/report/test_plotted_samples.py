@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 import pytest
+from support.histories import blocks_of
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.recording.sample_blocks import SampleBlocks
 from lathe_chatter.report.plotted_samples import RunSamples
 
 RATE = 1000.0
 
 
-class _Blocks(NamedTuple):
-    columns: tuple[str, ...]
-    samples: Array
-
-
-def blocks(parts: Iterable[Array]) -> list[_Blocks]:
-    return [_Blocks(('time', 'force'), part) for part in parts]
+def blocks(parts: Iterable[Array]) -> list[SampleBlocks]:
+    return [blocks_of(dict(zip(('time', 'force'), part.T, strict=True))) for part in parts]
 
 
 def signal(count: int, start: float = 0.0) -> Array:
@@ -43,7 +39,7 @@ def test_the_extremes_are_those_of_all_samples() -> None:
 
 def test_a_short_signal_is_kept_as_it_is() -> None:
     samples = signal(500)
-    passed = RunSamples.of({'time': samples[:, 0], 'force': samples[:, 1]})
+    passed = RunSamples(lambda _spans: blocks([samples]))
     assert passed.extremes.samples == 1
     assert np.array_equal(passed.extremes.of('force')[0], samples[:, 1])
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.histories import history_of
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import Change
-from lathe_chatter.model import Cut, Machine
+from lathe_chatter.model import Cut
 from lathe_chatter.report.monitor_record import Flag
-from lathe_chatter.report.plotted_samples import RunSamples
 from lathe_chatter.report.run_excerpts import excerpts_of
 from lathe_chatter.report.run_history import History, in_words
 from lathe_chatter.samples import SAMPLE_COLUMNS
@@ -21,10 +20,7 @@ from lathe_chatter.samples import SAMPLE_COLUMNS
 
 def history(parts: list[np.ndarray], changes: list[Change], acceleration: float) -> History:
     samples = dict(zip(SAMPLE_COLUMNS, np.concatenate(parts).T, strict=True))
-    return History(
-        Path('run'), Machine(), Cut(), RunSamples.of(samples), changes,
-        spindle_acceleration=acceleration,
-    )  # fmt: skip
+    return history_of(samples, changes=changes, spindle_acceleration=acceleration)
 
 
 def speed_change(time: float, speed: float) -> Change:
@@ -88,10 +84,7 @@ def test_a_record_that_begins_late_has_full_panels() -> None:
 
 def test_a_settled_figure_is_no_first_guess() -> None:
     told = np.array([[1.0, 1.02, 1.04, 1.06, 3.0], [1001.8, 207.0, 207.2, math.nan, 50.0]])
-    run = History(
-        Path('run'), Machine(), Cut(), RunSamples.of({'time': told[0]}),
-        estimates={'frequency': told},
-    )  # fmt: skip
+    run = history_of({'time': told[0]}, estimates={'frequency': told})
     assert run.settled('frequency', 1.0, 2.0) == 207.2
     assert math.isnan(run.settled('frequency', 1.5, 2.0))
     assert math.isnan(run.settled('growth_rate', 1.0, 2.0))

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from support.histories import history_of
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.lathe.change_and_knock_sentences import Change, Knock
-from lathe_chatter.model import Cut, Machine
-from lathe_chatter.report.plotted_samples import RunSamples
-from lathe_chatter.report.run_history import History
 from lathe_chatter.report.time_histories import apart, draw_time_histories
 from lathe_chatter.samples import SAMPLE_COLUMNS
 
@@ -37,7 +34,7 @@ def test_a_settled_run_has_axes_that_can_be_read() -> None:
     samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(20_000).T, strict=True))
     figure = Figure()
     panels = figure.subplots(4)
-    draw_time_histories(panels, History(Path('run'), Machine(), Cut(), RunSamples.of(samples)))
+    draw_time_histories(panels, history_of(samples))
     figure.draw_without_rendering()
     for axes in panels:
         assert not axes.yaxis.get_offset_text().get_text()
@@ -50,9 +47,8 @@ def test_a_gap_is_left_open() -> None:
     parts = [lathe.advance(1000)]
     lathe.advance(500)
     samples = np.concatenate([*parts, lathe.advance(1000)])
-    run = RunSamples.of(dict(zip(SAMPLE_COLUMNS, samples.T, strict=True)))
     panels = Figure().subplots(4)
-    draw_time_histories(panels, History(Path('run'), Machine(), Cut(), run))
+    draw_time_histories(panels, history_of(dict(zip(SAMPLE_COLUMNS, samples.T, strict=True))))
     drawn = panels[0].lines[0].get_ydata()
     assert len(drawn) == 2001
     assert np.flatnonzero(np.isnan(drawn)).tolist() == [1000]
@@ -63,7 +59,7 @@ def test_labels_of_much_that_happens_leave_room_to_the_plots() -> None:
     lathe = VirtualLathe()
     samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(5000).T, strict=True))
     knocks = [Knock(0.1 + 1e-4 * k, 0.01) for k in range(200)]
-    run = History(Path('run'), Machine(), Cut(), RunSamples.of(samples), knocks=knocks)
+    run = history_of(samples, knocks=knocks)
     figure = Figure(figsize=(12.0, 9.0), layout='constrained')
     panels = figure.subplots(4)
     draw_time_histories(panels, run)
@@ -83,9 +79,7 @@ def test_a_short_label_begins_at_its_line_also_at_the_end(
 ) -> None:
     lathe = VirtualLathe()
     samples = dict(zip(SAMPLE_COLUMNS, lathe.advance(5000).T, strict=True))
-    run = History(
-        Path('run'), Machine(), Cut(), RunSamples.of(samples), [Change(0.495, {}, change)]
-    )
+    run = history_of(samples, changes=[Change(0.495, {}, change)])
     panels = Figure(figsize=(12.0, 9.0), layout='constrained').subplots(4)
     draw_time_histories(panels, run)
     (label,) = panels[0].texts

@@ -63,7 +63,7 @@ def test_the_shipped_story_is_told_without_ros(tmp_path: Path) -> None:
     cut = history.cut_at(history.duration)
     for seated in (False, True):
         root = rightmost_root(
-            history.machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
+            history.sessions[0].machine, cut.spindle_speed_rpm, cut.depth_of_cut, seated=seated
         )
         assert root.real < 0.0
     assert len(told) == 5
