@@ -14,7 +14,6 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from lathe_chatter import stability
 from lathe_chatter.cli.common_options import add_json
 from lathe_chatter.cli.console import Screen
+from lathe_chatter.code_identity import processor_name
 from lathe_chatter.detection import ChatterDetector
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.lathe import VirtualLathe
@@ -74,15 +74,8 @@ def median_time(work: Callable[[], Any], repeats: int) -> float:
 
 def this_machine() -> str:
     """The machine in one line: processor, cores, system, Python and how busy it is."""
-    processor = platform.processor() or platform.machine()
-    info = Path('/proc/cpuinfo')
-    if info.is_file():
-        for line in info.read_text(encoding='utf-8', errors='replace').splitlines():
-            if line.startswith('model name'):
-                processor = line.partition(':')[2].strip()
-                break
     return (
-        f'{processor}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, '
+        f'{processor_name()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, '
         f'Python {platform.python_version()}, load average {os.getloadavg()[0]:.1f}'
     )
 

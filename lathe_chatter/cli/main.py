@@ -14,7 +14,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
-from lathe_chatter.nodes.end_signals import raise_lost_interrupts_again
+from lathe_chatter.nodes.end_signals import END_SIGNALS, raise_lost_interrupts_again
 from lathe_chatter.standard_streams import hold_standard_streams
 
 USER_ERROR = 2
@@ -36,11 +36,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _complain('The working directory is not there any more: change to one that is.')
         return USER_ERROR
     received: list[int] = []
-    ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {each: signal.getsignal(each) for each in ends}
+    before = {each: signal.getsignal(each) for each in END_SIGNALS}
     unraisable = raise_lost_interrupts_again()
     # One that is ignored, as under nohup, stays so.
-    heard = [each for each in ends if before[each] != signal.SIG_IGN]
+    heard = [each for each in END_SIGNALS if before[each] != signal.SIG_IGN]
 
     def interrupt(number: int, _frame: FrameType | None) -> None:
         """End in order: what was begun is finished."""

@@ -9,6 +9,7 @@ from contextlib import suppress
 
 from lathe_chatter.cli.common_options import add_run, add_topic
 from lathe_chatter.cli.console import Screen
+from lathe_chatter.nodes.end_signals import END_SIGNALS
 from lathe_chatter.page.recorded_run import RecordedRun
 from lathe_chatter.page.server import PageServer, open_in_browser
 
@@ -38,7 +39,7 @@ def run(options: Namespace) -> int:
 
     async def serve() -> None:
         loop = asyncio.get_running_loop()
-        for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for each in END_SIGNALS:
             if signal.getsignal(each) != signal.SIG_IGN:
                 loop.add_signal_handler(each, server.end)
         reading = asyncio.create_task(shown.read())

@@ -13,6 +13,7 @@ from lathe_chatter.report.run_excerpts import once_per_turn, spectrum
 from lathe_chatter.samples.continuity import times_of
 
 SIGNALS = ('tool_displacement', 'tool_velocity', 'workpiece_displacement', 'workpiece_velocity')
+COLUMNS = ('time', 'spindle_angle', *SIGNALS)
 COUNT = 1000
 """Stretches of an envelope."""
 SECONDS = 2.0, 60.0
@@ -113,8 +114,7 @@ class LiveSignals:
             self.lost += missing
             self._recent.clear()
         self.time, self._newest = float(times[-1]), int(places[-1])
-        wanted = ('time', 'spindle_angle', *SIGNALS)
-        picked = [columns.index(name) if name in columns else -1 for name in wanted]
+        picked = [columns.index(name) if name in columns else -1 for name in COLUMNS]
         kept = np.where(np.array(picked) >= 0, samples[:, picked], np.nan)
         for envelope in self.envelopes:
             envelope.add(places, kept[:, 2:])
@@ -136,7 +136,7 @@ def closeup(samples: Array) -> tuple[dict[str, float | None], dict[str, Array]]:
     """Portraits, once-per-turn points and the spectrum of the tool at the end of some samples.
 
     Args:
-        samples: Time, angle and the SIGNALS (n, 6), even in time, n > 0.
+        samples: The COLUMNS (n, 6), even in time, n > 0.
 
     Returns:
         Spindle speed, rev/min, and the step of the spectrum, Hz; and the arrays.

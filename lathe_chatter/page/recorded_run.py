@@ -16,7 +16,7 @@ import numpy as np
 
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import LatheChatterError, reason_of
-from lathe_chatter.page.live_signals import SIGNALS, closeup
+from lathe_chatter.page.live_signals import COLUMNS, closeup
 from lathe_chatter.page.server import Viewer
 from lathe_chatter.page.stability_chart import draw_chart, fits
 from lathe_chatter.page.versioned_values import Board
@@ -34,7 +34,6 @@ from lathe_chatter.report.monitor_record import value_near
 from lathe_chatter.report.operating_points import stays_of
 from lathe_chatter.report.run_history import History, in_words, read_history
 
-COLUMNS = ('time', 'spindle_angle', *SIGNALS)
 _GLANCES = 150
 """Chunks that the first picture is made of."""
 _POINTS = 1000

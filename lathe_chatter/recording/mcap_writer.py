@@ -95,7 +95,7 @@ class CommittedFile:
         OSError: If the file cannot be made.
     """
 
-    def __init__(self, path: Path, compression: Compression = Compression.LZ4) -> None:
+    def __init__(self, path: Path, compression: Compression) -> None:
         """Make the file and commit its empty beginning."""
         self._compression = compression
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
@@ -186,11 +186,8 @@ class CommittedFile:
         self.committed = self._contents
         self._sync.request(sum(self.committed.counts.values()))
 
-    def close(self, *, wait: bool = True) -> FileSync:
-        """Commit and close.
-
-        Args:
-            wait: For the disk. What is returned can be joined later instead.
+    def close(self) -> FileSync:
+        """Commit and close; what is returned is to be joined, which waits for the disk.
 
         Raises:
             OSError: If the disk refuses.
@@ -199,8 +196,6 @@ class CommittedFile:
             self.commit()
         finally:
             self._sync.end()
-            if wait:
-                self._sync.join()
         return self._sync
 
     def abandon(self) -> None:

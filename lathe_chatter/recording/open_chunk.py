@@ -120,7 +120,7 @@ class OpenChunk:
         )
         records += data
 
-    def close(self, offset: int, compression: Compression = Compression.LZ4) -> ClosedChunk:
+    def close(self, offset: int, compression: Compression) -> ClosedChunk:
         """The chunk as it stands at an offset of its file. It holds at least one message."""
         times = [np.frombuffer(index, np.uint64)[::2] for index in self._indexes.values()]
         first = int(min(each.min() for each in times))

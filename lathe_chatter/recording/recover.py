@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -88,13 +87,7 @@ class _Copy:
     """
 
     def __init__(self, folder: Path, distribution: str) -> None:
-        self.files = RunFiles(
-            folder,
-            distribution,
-            min_free_space=0,
-            split_duration=math.inf,
-            split_size=math.inf,
-        )
+        self.files = RunFiles(folder, distribution)
         self.messages: Counter[str] = Counter()
         self.last: dict[str, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import shutil
 import time
 from collections import Counter, deque
@@ -134,9 +135,9 @@ class RunFiles:
         folder: Path,
         distribution: str,
         *,
-        min_free_space: int,
-        split_duration: float,
-        split_size: float,
+        min_free_space: int = 0,
+        split_duration: float = math.inf,
+        split_size: float = math.inf,
         compression: Compression = Compression.LZ4,
     ) -> None:
         """Make the folder with a first, empty file and its metadata."""
@@ -295,7 +296,7 @@ class RunFiles:
         self._file.add_metadata(CLOSED, {'next': next_name, 'messages': counts})
         self._file.add_metadata('rosbag2', {'serialized_metadata': self._description()})
         name = self._name(len(self._finished))
-        sync = self._file.close(wait=False)
+        sync = self._file.close()
         self._finished.append(_FinishedFile(name, self._file.committed, sync))
 
     def _description(self) -> str:
