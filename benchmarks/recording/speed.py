@@ -13,10 +13,12 @@ from pathlib import Path
 import numpy as np
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
-from runs import ARRAY, PER_COMMIT, START, STORE, TICK, blocks, samples_topic, scratch
+from rosbags.typesys import Stores, get_typestore
+from runs import PER_COMMIT, START, TICK, blocks, samples_topic, scratch
 
 from lathe_chatter.recording import RunWriter, read_run
 from lathe_chatter.samples import SAMPLE_COLUMNS
+from lathe_chatter.samples.codec import SAMPLES_TYPE
 from lathe_chatter.scenario import Scenario
 from lathe_chatter.scenario.simulation import simulate
 
@@ -80,12 +82,14 @@ def reading() -> None:
 
 def _read_by_others(run: Path) -> None:
     """One column of the same run by the libraries that read bags, each as its manual has it."""
-    column = SAMPLE_COLUMNS.index('tool_displacement')
+    column, store = SAMPLE_COLUMNS.index('tool_displacement'), get_typestore(Stores.ROS2_JAZZY)
 
     def by_rosbags() -> int:
         with Reader(run) as reader:
             parts = [
-                STORE.deserialize_cdr(data, ARRAY).data.reshape(-1, len(SAMPLE_COLUMNS))[:, column]
+                store.deserialize_cdr(data, SAMPLES_TYPE).data.reshape(-1, len(SAMPLE_COLUMNS))[
+                    :, column
+                ]
                 for _, _, data in reader.messages()
             ]
         return len(np.concatenate(parts))

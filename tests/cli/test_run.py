@@ -63,15 +63,17 @@ def at_pace(name: str, folder: Path) -> Path:
     return copy
 
 
-def play(scenario: Path, output: Path, environment: dict[str, str]) -> dict[str, Any]:
-    done = subprocess.run(
-        command('--scenario', str(scenario), '--output', str(output), '--json'),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
+def called(
+    scenario: Path, output: Path, environment: dict[str, str], *more: str
+) -> subprocess.CompletedProcess[str]:
+    words = command('--scenario', str(scenario), '--output', str(output), *more)
+    return subprocess.run(
+        words, env=environment, capture_output=True, text=True, check=False, timeout=120
     )
+
+
+def play(scenario: Path, output: Path, environment: dict[str, str]) -> dict[str, Any]:
+    done = called(scenario, output, environment, '--json')
     assert done.returncode == 0, done.stdout + done.stderr
     figures: dict[str, Any] = json.loads(done.stdout)
     return {**figures, 'said': done.stderr}
@@ -221,14 +223,7 @@ def test_a_refused_step_ends_the_run_with_the_reason(
     scenario = tmp_path / 'wrong.yaml'
     scenario.write_text(SHORT.replace('depth_of_cut: 0.00062', 'depth_of_cut: 0.5'))
     began = time.monotonic()
-    done = subprocess.run(
-        command('--scenario', str(scenario), '--output', str(tmp_path / 'run')),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    done = called(scenario, tmp_path / 'run', environment)
     assert done.returncode == 2, f'{done.stdout}{done.stderr} {time.monotonic() - began}'
     assert 'depth_of_cut' in done.stderr
     assert '0.1 m' in done.stderr
@@ -259,14 +254,7 @@ def test_a_misspelt_parameter_is_refused_before_anything_starts(
 ) -> None:
     scenario = tmp_path / 'wrong.yaml'
     scenario.write_text(SHORT.replace('depth_of_cut: 0.00062', 'depth_of_cuts: 0.0006'))
-    done = subprocess.run(
-        command('--scenario', str(scenario), '--output', str(tmp_path / 'run')),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    done = called(scenario, tmp_path / 'run', environment)
     assert done.returncode == 2
     assert (
         "'depth_of_cuts' cannot change while the lathe cuts: did you mean depth_of_cut?"
@@ -287,14 +275,7 @@ def test_a_lathe_that_is_there_already_is_left_alone(
         assert foreign.stderr is not None
         while 'Waiting for' not in (line := foreign.stderr.readline()):
             assert line, 'the lathe ended'
-        done = subprocess.run(
-            command('--scenario', str(scenario), '--output', str(tmp_path / 'run')),
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=120,
-        )
+        done = called(scenario, tmp_path / 'run', environment)
         foreign.send_signal(signal.SIGINT)
         said = foreign.stderr.read()
     assert done.returncode == 2, done.stdout + done.stderr

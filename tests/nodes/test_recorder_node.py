@@ -124,31 +124,17 @@ def test_an_existing_folder_is_refused(start: Start, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_with_exit_0_and_a_finished_run(
-    number: signal.Signals, bench: Bench, spin_until: Any, tmp_path: Path
+    number: signal.Signals, recorder_process: Any, bench: Bench, spin_until: Any, tmp_path: Path
 ) -> None:
     publisher = bench.node.create_publisher(Float64, '/n', KEPT)
-    parameters = [f'output:={tmp_path / "run"}', 'topics:=[/n]']
-    words = [word for parameter in parameters for word in ('-p', parameter)]
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            '-m',
-            'lathe_chatter.nodes.entry_points',
-            'run_recorder',
-            '--ros-args',
-            *words,
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    process = recorder_process()
     spin_until(lambda: publisher.get_subscription_count() == 1, 'the recorder')
     for k in range(100):
         publisher.publish(Float64(data=float(k)))
     publisher.wait_for_all_acked()
     process.send_signal(number)
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 0, out
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 0, err
     run = read_run(tmp_path / 'run')
     assert [m.message.data for m in run.messages('/n')] == [float(k) for k in range(100)]
 
@@ -299,18 +285,6 @@ def test_a_full_disk_ends_it_with_a_sentence_and_exit_1(
     assert err.splitlines()[-1].endswith('the recording ends, complete up to here.')
     assert 'Traceback' not in err
     assert read_run(tmp_path / 'run').topics == {}
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 1 MB, at the place where the run will be."""
-    place = tmp_path / 'disk'
-    place.mkdir()
-    command = ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(place)]
-    if os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode:
-        pytest.skip('only root can mount a small disk')
-    yield place
-    subprocess.run(['umount', '-l', str(place)], check=True)
 
 
 def test_a_disk_that_fills_up_ends_it_with_its_last_good_state(

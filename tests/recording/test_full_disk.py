@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import resource
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -67,17 +65,6 @@ def test_a_write_that_is_refused_half_way_leaves_the_commit_before(tmp_path: Pat
     check(tmp_path / 'run', committed)
     metadata = (tmp_path / 'run' / 'metadata.yaml').read_text()
     assert f'message_count: {committed}' in metadata
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    place = tmp_path / 'disk'
-    place.mkdir()
-    command = ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(place)]
-    if os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode:
-        pytest.skip('only root can mount a small disk')
-    yield place
-    subprocess.run(['umount', str(place)], check=True)
 
 
 def test_a_full_disk_leaves_the_commit_before(small_disk: Path) -> None:
