@@ -46,7 +46,7 @@ class LatheRun(AbstractContextManager['LatheRun']):
 
     Args:
         folder: To make.
-        parameters: Of the lathe at its start, by name (`model.parameters.parameters_of`).
+        parameters: Of the lathe at its start, by name (`lathe_parameter_table.parameters_of`).
         name: Of the lathe, beginning with a slash: its topics are below.
         simulated: Whether messages are dated by simulated time since now, instead of when they
             were written.

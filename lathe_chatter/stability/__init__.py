@@ -1,8 +1,8 @@
 """Stability of a cut: growth rates, limits, lobes and advice, one import for all of them.
 
 `roots` finds and proves characteristic roots, `lobes` holds what is known in closed form,
-`safe_limit` adds the bearing clearance, `speed_variation` the periodic spindle, and `advice`
-turns roots and lobes into a spindle speed. None needs more than NumPy.
+`safe_limit` adds the bearing clearance, `speed_variation` the periodic spindle, and
+`speed_search` turns roots and lobes into a spindle speed. None needs more than NumPy.
 """
 
 from __future__ import annotations

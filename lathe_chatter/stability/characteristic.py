@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from lathe_chatter.array_types import Array, Integers
 from lathe_chatter.errors import ParameterError
 from lathe_chatter.model import Body, Cut, Machine
-from lathe_chatter.model.quantity_fields import Quantity, check_flag, quantity_of
+from lathe_chatter.model.quantity_fields import Quantity, check_flag, limits_of
 from lathe_chatter.stability.compiled_characteristic import (
     ALPHA,
     BETA,
@@ -74,7 +74,7 @@ class ProcessDamping:
     @classmethod
     def of(cls, cut: Cut) -> ProcessDamping:
         """That of a cut."""
-        return cls(getattr(cut, 'process_damping', 0.0), getattr(cut, 'workpiece_diameter', 0.05))
+        return cls(cut.process_damping, cut.workpiece_diameter)
 
 
 NO_DAMPING = ProcessDamping()
@@ -255,8 +255,7 @@ def checked(name: str, values: ArrayLike) -> Array:
     Raises:
         ParameterError: For the first that is not allowed.
     """
-    limits = quantity_of(Cut.__dataclass_fields__[name])
-    assert limits is not None  # noqa: S101 -- a name within this package
+    limits = limits_of(Cut, name)
     try:
         numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
