@@ -9,8 +9,8 @@ scenarios, recorded runs and the documentation are made from these rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields, is_dataclass, replace
 from enum import Enum
 from typing import Any, Protocol, TypeVar
 
@@ -159,20 +159,29 @@ def parameters_of(lathe: HasParameters) -> dict[str, Any]:
     A machine that takes more than these names to tell is there as the text of its file, under
     `machine`, without the names that it has no single value for.
     """
-    setup, found = lathe.setup, dict[str, Any]()
+    setup = lathe.setup
     bodies = (setup.machine.tool, setup.machine.workpiece)
     described = any(_needs_file(body) for body in bodies)
     text = MachineDescription(setup.machine, lathe.cut).text() if described else ''
-    found[MACHINE_FILE.name] = text
-    for owner, rows in ((lathe.cut, CUT_ROWS), (setup.machine, MACHINE_ROWS), (setup, SETUP_ROWS)):
-        for row in rows:
-            value: Any = owner
-            *parts, name = row.name.split('.')
-            for part in parts:
-                value = getattr(value, part)
-            if not isinstance(value, Structure):
-                value = getattr(value, name)
-                found[row.name] = value.value if isinstance(value, Enum) else value
+    return {
+        MACHINE_FILE.name: text,
+        **_values(CUT_ROWS, lathe.cut),
+        **_values(MACHINE_ROWS, setup.machine),
+        **_values(SETUP_ROWS, setup),
+    }
+
+
+def _values(rows: Iterable[Row], owner: Any) -> dict[str, Any]:
+    """What parameters have in a value of the model, without those of a body with several modes."""
+    found = dict[str, Any]()
+    for row in rows:
+        value = owner
+        *parts, name = row.name.split('.')
+        for part in parts:
+            value = getattr(value, part)
+        if not isinstance(value, Structure):
+            value = getattr(value, name)
+            found[row.name] = value.value if isinstance(value, Enum) else value
     return found
 
 
@@ -211,18 +220,8 @@ def derived_machine(given: Values) -> Resolved:
     if described is None:
         return {'bearing_stiffness': machine.bearing_stiffness}
     found: dict[str, Any] = dict.fromkeys(row.name for row in MACHINE_ROWS)
-    described = replace(described, machine=machine)
-    found |= parameters_of(_Described(LatheSetup(machine), described.cut))
-    found = {name: found[name] for name in found if name in {row.name for row in MACHINE_ROWS}}
-    return {**found, MACHINE_FILE.name: described.text()}
-
-
-@dataclass(frozen=True)
-class _Described:
-    """A machine as `parameters_of` takes it."""
-
-    setup: LatheSetup
-    cut: Cut
+    text = replace(described, machine=machine).text()
+    return {**found, **_values(MACHINE_ROWS, machine), MACHINE_FILE.name: text}
 
 
 def _derived_lathe(given: Values) -> Resolved:
@@ -231,7 +230,7 @@ def _derived_lathe(given: Values) -> Resolved:
     samples_per_tick(setup.sample_rate, float(given.get('tick_rate', LATHE['tick_rate'].default)))  # type: ignore[arg-type]  # checked numbers
     if not given.get(MACHINE_FILE.name):
         return derived_machine(given)
-    found = parameters_of(_Described(setup, cut_from(given)))
+    found = _values(CUT_ROWS, cut_from(given)) | _values(SETUP_ROWS, setup)
     return {**derived_machine(given), **{name: found[name] for name in OF_A_MACHINE_FILE}}
 
 
