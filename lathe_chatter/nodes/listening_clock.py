@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
 
 _STOOD_STILL = 0.5
 """s between two readings after which the node was stopped, or busy: it listened to nobody."""
 _TICK = 1e-3
-_RESUMED = 5.0
-"""s until DDS, which first settles what was missed, has delivered again to such a node."""
+_RESUMED = 30.0
+"""s until DDS has delivered again to such a node, if it does: it settles first what was missed."""
 
 
 class ListeningClock:
@@ -20,7 +19,7 @@ class ListeningClock:
         """It begins with the first reading."""
         self._read_at = math.nan
         self._stood = 0.0
-        self._woke_at = -math.inf
+        self._wakings: list[float] = []
 
     def now(self) -> float:
         """Seconds since some moment, without those in which the node stood still."""
@@ -29,20 +28,18 @@ class ListeningClock:
         self._read_at = now
         if since > _STOOD_STILL:
             self._stood += since - _TICK  # so that before and after are two times
-            self._woke_at = now - self._stood
+            self._wakings.append(now - self._stood)
         return now - self._stood
 
     def misses(self, heard_at: float, seconds: float) -> bool:
-        """Whether nothing has come for so long, and that is not for a standstill of the node."""
-        return self.now() > heard_at + seconds and not self.awaits([heard_at], seconds)
+        """Whether nothing has come for so long, or since the node stood still."""
+        return self.now() > heard_at + seconds or heard_at < max(self._wakings, default=-math.inf)
 
-    def awaits(self, heard_at: Iterable[float], seconds: float) -> bool:
-        """Whether the node stood still, and not all that it heard just before has come again.
+    def excuses(self, heard_at: float, seconds: float) -> bool:
+        """Whether that may be for a standstill of the node, less than so long from then.
 
-        Args:
-            heard_at: When each came last.
-            seconds: What counts as just before.
+        What comes just after one may have waited for it.
         """
-        if self.now() > self._woke_at + _RESUMED:
-            return False
-        return any(self._woke_at - seconds < at < self._woke_at for at in heard_at)
+        now = self.now()
+        self._wakings = [each for each in self._wakings if each > now - _RESUMED]
+        return any(abs(heard_at - each) < seconds for each in self._wakings)

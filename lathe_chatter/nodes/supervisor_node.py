@@ -49,7 +49,7 @@ _LOSS = 2.0
 """s after lost samples in which nothing is done."""
 _NO_ANSWER = 2.0
 """s in which the lathe has to answer."""
-_STOOD_STILL = 'this node stood still, and has yet to hear the monitor again'
+_STOOD_STILL = 'this node stood still, and does not hear the monitor yet'
 _EVENTS = '/parameter_events'  # which every node publishes
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -162,7 +162,7 @@ class SupervisorNode(ParameterNode):
 
     def _on_figure(self, name: str, message: Float64) -> None:
         self._heard_at = self._listening.now()
-        self._figures[name] = message.data, self._heard_at
+        self._figures[name] = message.data, time.monotonic()
 
     def _newest_flag(self) -> bool | None:
         """The flag as it is now, also in the middle of a decision; None until it was heard."""
@@ -259,9 +259,9 @@ class SupervisorNode(ParameterNode):
     # -- acting --------------------------------------------------------------------------------
 
     def _seen(self, cut: Cut) -> Seen:
-        now, listened, flag = time.monotonic(), self._listening.now(), self._newest_flag()
+        now, flag = time.monotonic(), self._newest_flag()
         # What is not known any more is not published any more.
-        fresh = {n: value for n, (value, at) in self._figures.items() if listened < at + _SILENCE}
+        fresh = {n: value for n, (value, at) in self._figures.items() if now < at + _SILENCE}
         works_with = self._reports.values(self._monitor, 'cut').get('works with')
         self._core.machine = self._machine if works_with in _BELIEVED else None
         number = partial(self._reports.number, self._monitor, 'cut')
@@ -276,7 +276,8 @@ class SupervisorNode(ParameterNode):
             spindle_acceleration=float(self._told[self._lathe].get('spindle_acceleration', 0.0)),
             lasted=self._lasted(now),
             hindrance=self._hindrance(),
-            judged=self._state not in _NOT_JUDGED and listened < self._heard_at + _SILENCE,
+            judged=self._state not in _NOT_JUDGED
+            and not self._listening.misses(self._heard_at, _SILENCE),
             flag_stays=lambda: self._is_known_lathe() and self._newest_flag() == flag,
         )
 
@@ -289,10 +290,11 @@ class SupervisorNode(ParameterNode):
 
     def _hindrance(self) -> str:
         """Why nothing may be done, as the end of a sentence; empty where it may."""
-        known = [at for _, at in self._figures.values()]
+        silent = self._listening.misses(self._heard_at, _SILENCE)
+        stood_still = self._listening.excuses(self._heard_at, _SILENCE)
         reasons = {
-            _STOOD_STILL: self._listening.awaits([self._heard_at, *known], _SILENCE),
-            'nothing comes from the monitor': self._listening.misses(self._heard_at, _SILENCE),
+            _STOOD_STILL: silent and stood_still,
+            'nothing comes from the monitor': silent,
             'the monitor does not know the state of the cut': self._state == UNKNOWN,
             'samples were lost': time.monotonic() < self._lost_at + _LOSS,
             'there is another supervisor': self.count_publishers('~/action') > 1,
@@ -302,7 +304,8 @@ class SupervisorNode(ParameterNode):
 
     def _look(self) -> None:
         if self._answer is not None:
-            if self._listening.misses(self._answer[1], _NO_ANSWER):
+            asked = self._answer[1], _NO_ANSWER
+            if self._listening.misses(*asked) and not self._listening.excuses(*asked):
                 self._answer = None
                 self._say_of(self._core.refused('the lathe does not answer'))
         elif self._cut is not None and self._newest_flag() is not None:

@@ -585,8 +585,8 @@ SAID = {
             'no message of it for a second in which the node has listened',
             f'{SUPERVISOR}::test_a_silent_monitor_keeps_it_from_acting',
         ),
-        'this node stood still, and has yet to hear the monitor again': (
-            'it was stopped, or busy, and has yet to hear again what it knew of the monitor',
+        'this node stood still, and does not hear the monitor yet': (
+            'it was stopped, or busy, and since then nothing of the monitor has come, or no more',
             f'{SUPERVISOR}::test_a_supervisor_that_stood_still_blames_nobody',
         ),
         'the monitor does not know the state of the cut': (
