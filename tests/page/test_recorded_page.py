@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from support.browser import Browser, chromium
+from support.served_page import serving
 
 from lathe_chatter.lathe.config import recorded_config
 from lathe_chatter.model.lathe_parameter_table import parameters_of
@@ -33,19 +31,11 @@ def unheard(tmp_path: Path) -> Path:
     return tmp_path / 'run'
 
 
-@contextmanager
-def served(path: Path, port: int = 0) -> Iterator[str]:
+def page_of(path: Path, port: int = 0) -> PageServer:
     """The page of a run that is read, on a port."""
     shown = RecordedRun(path)
     asyncio.run(shown.read())
-    server = PageServer(shown, '127.0.0.1', port)
-    serving = threading.Thread(target=lambda: asyncio.run(server.run()))
-    serving.start()
-    try:
-        yield server.url
-    finally:
-        server.end()
-        serving.join(PATIENCE)
+    return PageServer(shown, '127.0.0.1', port)
 
 
 @pytest.mark.skipif(chromium() is None, reason='no Chromium is here')
@@ -53,15 +43,16 @@ def test_it_claims_nothing_of_what_is_not_in_the_record(unheard: Path, tmp_path:
     browser = Browser(tmp_path / 'profile')
     drawn = '["tool-portrait", "spectrum"].map(id => plots.get(id)?.root.ariaLabel)'
     try:
-        with served(unheard) as url:
-            browser.open(url)
+        page = page_of(unheard)
+        with serving(page):
+            browser.open(page.url)
             browser.until(f'{drawn}.every(text => text?.includes("\\u00b5m"))', 'the last of it')
             assert browser.text('#lamp-word') == 'unknown'
             browser.run('look(5.5, 1)')
             none = 'Nothing has come to be shown here.'
             browser.until(f'{drawn}.every(text => text === "{none}")', 'that there is nothing')
         browser.until(f'{GONE}.textContent.includes("does not answer")', 'that it is gone')
-        with served(unheard, int(url.split(':')[2].strip('/'))):
+        with serving(page_of(unheard, page.port)):
             browser.until(f'{GONE}.hidden', 'that it is back', PATIENCE)
             unheard.rename(tmp_path / 'elsewhere')
             browser.run('look(2.5, 0.1)')

@@ -9,9 +9,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from support.browser import Browser, chromium
+from support.served_page import serving
 from support.two_lathes import FLAGS, record_two_lathes
 
 from lathe_chatter.cli.main import main
@@ -281,13 +282,10 @@ def test_a_browser_scrubs_through_the_run(served: str, tmp_path: Path, width: in
 def test_what_is_not_read_yet_is_said_to_be_so(run: Path, tmp_path: Path) -> None:
     shown = RecordedRun(run)
     server = PageServer(shown, '127.0.0.1', 0)
-    loop = asyncio.new_event_loop()
-    serving = threading.Thread(target=lambda: loop.run_until_complete(server.run()))
-    serving.start()
     browser = Browser(tmp_path / 'profile')
     state = 'document.querySelector("#run-state").textContent'
     lamp = 'document.querySelector("#lamp-word").textContent'
-    try:
+    with closing(browser), serving(server) as loop:
         browser.open(server.url)
         browser.until(f'{state}.startsWith("Reading: 0 of ")', 'that it is read')
         browser.until('document.querySelector("#overview canvas")', 'the first picture')
@@ -303,10 +301,6 @@ def test_what_is_not_read_yet_is_said_to_be_so(run: Path, tmp_path: Path) -> Non
         assert browser.text('#at-text') == '12.00 s'
         assert browser.text('#run-state') == ''
         assert browser.complaints == []
-    finally:
-        browser.close()
-        server.end()
-        serving.join(PATIENCE)
 
 
 def test_it_is_only_looked_at(served: str) -> None:

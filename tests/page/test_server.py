@@ -6,13 +6,13 @@ import asyncio
 import http.client
 import json
 import socket
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
 import pytest
 from support.page_cell import PATIENCE, header_of
+from support.served_page import serving
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -74,21 +74,18 @@ class Somebody:
 @pytest.fixture
 def come(request: pytest.FixtureRequest) -> Iterator[Callable[[], Somebody]]:
     """A page on this machine, which wants the token that a test gives, and people who come."""
-    loop, source, people = asyncio.new_event_loop(), Source(), []
+    source, people = Source(), list[Somebody]()
     server = PageServer(source, '127.0.0.1', 0, getattr(request, 'param', ''))
-    serving = threading.Thread(target=lambda: loop.run_until_complete(server.run()))
-    serving.start()
 
     def come() -> Somebody:
         people.append(Somebody(server.url))
         return people[-1]
 
-    yield come
-    loop.call_soon_threadsafe(source.goes_on.set)
-    for each in people:
-        each.socket.close()
-    server.end()
-    serving.join(PATIENCE)
+    with serving(server) as loop:
+        yield come
+        loop.call_soon_threadsafe(source.goes_on.set)
+        for each in people:
+            each.socket.close()
 
 
 @pytest.mark.parametrize(
@@ -112,11 +109,8 @@ def test_a_page_that_cannot_be_served_says_why(host: str, token: str, said: str)
 
 
 def test_the_page_is_there_under_the_name_that_it_was_given_and_no_foreign_one() -> None:
-    loop, source = asyncio.new_event_loop(), Source()
-    server = PageServer(source, '127.1', 0, TOKEN)  # 127.0.0.1, as resolvers of names have it
-    serving = threading.Thread(target=lambda: loop.run_until_complete(server.run()))
-    serving.start()
-    try:
+    server = PageServer(Source(), '127.1', 0, TOKEN)  # 127.0.0.1, as resolvers of names have it
+    with serving(server):
         for host, status in ((server.url.split('/')[2], 200), ('elsewhere.example', 403)):
             asked = http.client.HTTPConnection('127.0.0.1', server.port)
             asked.request('GET', '/', headers={'Host': host})
@@ -124,9 +118,6 @@ def test_the_page_is_there_under_the_name_that_it_was_given_and_no_foreign_one()
             assert answer.status == status
             text = answer.read().decode()
         assert text == "There is nothing for 'elsewhere.example' here.\n"
-    finally:
-        server.end()
-        serving.join(PATIENCE)
 
 
 Come = Callable[[], Somebody]
