@@ -22,6 +22,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
+from lathe_chatter.nodes.polled_subscription import node_marks
 
 _NODES = {
     'monitor': 'chatter_monitor',
@@ -76,6 +77,7 @@ class CellClients:
         self._node, self._put = node, put
         self._types: dict[str, dict[str, int]] = {}
         self._ready: dict[str, float] = {}
+        self._marks: dict[str, frozenset[tuple[int, ...]]] = {}  # of those who were asked
         self._asking: set[str] = set()
         services = {(who, name): kind for who, kind, name, _ in _SERVICES.values()}
         for who in _DESCRIBED:
@@ -96,8 +98,10 @@ class CellClients:
 
     async def look(self) -> None:
         """Get to know the parameters of those that have come."""
-        now = time.monotonic()
+        now, marks = time.monotonic(), node_marks(self._node)
         for who in _DESCRIBED:
+            if not marks.get(self.names[who], frozenset()) <= self._marks.get(who, frozenset()):
+                self.values.pop(who, None)  # another one of its name has come
             if not self._clients[who, 'list_parameters'].service_is_ready():
                 self._ready.pop(who, None)
                 if self.values.pop(who, None) is not None and who != 'lathe':
@@ -110,6 +114,7 @@ class CellClients:
     async def _describe(self, who: str) -> None:
         """Ask a node what parameters it has, and what they are."""
         self._asking.add(who)
+        self._marks[who] = node_marks(self._node).get(self.names[who], frozenset())
         try:
             names = sorted((await self._call(who, 'list_parameters')).result.names)
             described = await self._call(who, 'describe_parameters', names=names)

@@ -30,16 +30,20 @@ def publisher_names(node: Node, topic: str) -> list[str]:
     return sorted(map(full_name, offers))
 
 
-def publisher_marks(node: Node, topic: str, of: str | None = None) -> frozenset[tuple[int, ...]]:
-    """The marks that DDS gives to those that publish a topic, of one node only where it is told.
+def node_marks(node: Node) -> dict[str, frozenset[tuple[int, ...]]]:
+    """The marks that DDS gives to each node, by its full name: another one of a name has others.
+
+    They are those of the publisher of parameter events, which every node has. A node that was
+    killed is in the graph for a while.
 
     Args:
         node: That asks the graph.
-        topic: Its full name.
-        of: Full name of the node.
     """
-    offers = node.get_publishers_info_by_topic(topic)
-    return frozenset(tuple(o.endpoint_gid) for o in offers if of is None or full_name(o) == of)
+    marks: dict[str, frozenset[tuple[int, ...]]] = {}
+    for offer in node.get_publishers_info_by_topic('/parameter_events'):
+        name = full_name(offer)
+        marks[name] = marks.get(name, frozenset()) | {tuple(offer.endpoint_gid)}
+    return marks
 
 
 def full_name(offer: TopicEndpointInfo) -> str:
@@ -115,7 +119,8 @@ class PolledSubscription:
 
     def publishers(self) -> frozenset[tuple[int, ...]]:
         """The marks that DDS gives to those that publish the topic."""
-        return publisher_marks(self._node, self._subscription.topic_name)
+        offers = self._node.get_publishers_info_by_topic(self._subscription.topic_name)
+        return frozenset(tuple(offer.endpoint_gid) for offer in offers)
 
     def end(self) -> None:
         """Unsubscribe."""

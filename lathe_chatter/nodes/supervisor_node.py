@@ -36,7 +36,7 @@ from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
-from lathe_chatter.nodes.polled_subscription import PolledSubscription, publisher_marks
+from lathe_chatter.nodes.polled_subscription import PolledSubscription, node_marks
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.supervisor_limits import limits_from, unsuited
 from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
@@ -50,7 +50,6 @@ _LOSS = 2.0
 _NO_ANSWER = 2.0
 """s in which the lathe has to answer."""
 _STOOD_STILL = 'this node stood still, and does not hear the monitor yet'
-_EVENTS = '/parameter_events'  # which every node publishes
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SENTENCES = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Two may come at once; who comes late has the newest."""
@@ -106,7 +105,7 @@ class SupervisorNode(ParameterNode):
         for kind, topic, qos, hear in (
             (String, 'chatter_monitor/state', _LATCHED, self._on_state),
             (DiagnosticArray, '/diagnostics', QoSProfile(depth=10), self._on_diagnostics),
-            (ParameterEvent, _EVENTS, QoSProfile(depth=100), self._on_event),
+            (ParameterEvent, '/parameter_events', QoSProfile(depth=100), self._on_event),
         ):
             self.create_subscription(kind, topic, hear, qos)
         self._flags = PolledSubscription(self, Bool, 'chatter_monitor/chatter', _LATCHED)
@@ -198,7 +197,7 @@ class SupervisorNode(ParameterNode):
 
     def _is_known_lathe(self) -> bool:
         """Whether none has come since it told what it is: one that comes is asked."""
-        known = publisher_marks(self, _EVENTS, self._lathe) <= self._marks
+        known = node_marks(self).get(self._lathe, frozenset()) <= self._marks
         if not known:
             self._begin_again()
         return known
@@ -245,7 +244,7 @@ class SupervisorNode(ParameterNode):
             told = self._told.get(self._lathe, {})
         try:
             if name == self._lathe:
-                self._marks = publisher_marks(self, _EVENTS, name)
+                self._marks = node_marks(self).get(name, frozenset())
                 self._take_changes(self._told[name])
             self._core.limits = self._limits()
             if told and source != ModelSource.NONE.value:

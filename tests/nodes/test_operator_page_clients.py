@@ -11,6 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from support.node_bench import Bench
+from support.node_processes import NodeProcesses
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.nodes.lathe_node import LatheNode
@@ -69,3 +70,21 @@ def test_who_does_not_answer_is_named(clients: CellClients, bench: Bench) -> Non
     assert clients.awaited == 0
     deaf.destroy_node()
     idle.shutdown()
+
+
+def test_another_lathe_of_the_name_of_one_that_was_killed_is_asked_anew(
+    clients: CellClients, bench: Bench, nodes: NodeProcesses
+) -> None:
+    """Its services were never away: DDS keeps those of a killed one for a while."""
+
+    def await_depth(depth: float) -> None:
+        def is_known() -> bool:
+            assert refusal(bench, clients.look()) == ''
+            return bool(clients.values.get('lathe', {}).get('depth_of_cut') == depth)
+
+        bench.spin_until(is_known, f'a depth of {depth} m')
+
+    for depth in (1e-4, 2e-4):
+        nodes.start('lathe', f'depth_of_cut:={depth}', 'use_sim_time:=true')
+        await_depth(depth)
+        nodes.kill('/lathe')
