@@ -76,6 +76,7 @@ class Witness:
         """Listen."""
         self.flag, self._done, self._last = False, done, 0.0
         self._heard = DiagnosticsListener()
+        self._took_at = self._listens_since = 0.0
         self._told: set[str] = set()
         depth = QoSProfile(depth=20_000)
         self._samples = PolledSubscription(node, Float64MultiArray, '/lathe/samples', depth)
@@ -88,7 +89,11 @@ class Witness:
         self.flag = message.data
 
     def take(self) -> None:
-        """Note when samples were sent."""
+        """Note when samples were sent; called again and again."""
+        now = time.monotonic()
+        if now > self._took_at + SILENCE:  # the witness itself stood still
+            self._listens_since = now
+        self._took_at = now
         for _, info in self._samples.take():
             sent = info['source_timestamp'] / 1e9
             if self._last and sent - self._last > SILENCE:
@@ -109,7 +114,8 @@ class Witness:
     def look(self) -> None:
         """See that all speak who run and were not disturbed just now."""
         for each in self._done.sessions:
-            silent = self._heard.silence(f'/{each.name}')
+            listened = time.monotonic() - self._listens_since
+            silent = min(listened, self._heard.silence(f'/{each.name}'))
             old = time.time() - each.started > _SPEAKS_AFTER
             if old and not each.ended and each.name != 'operator_page' and silent > _SPEAKS_EVERY:
                 self._done.faults.append(f'{each.name} has said nothing for {silent:.0f} s')

@@ -246,4 +246,4 @@ def _left(times: Array, motion: Array, onset: float, at: float) -> float:
     size = int(_WINDOW * _RATE)
     pieces = motion[inside][-(np.count_nonzero(inside) // size) * size :].reshape(-1, size)
     rms = np.std(pieces, axis=1)
-    return float(rms[-1] / rms.max())
+    return float(rms[-1] / rms.max()) if rms.any() else 0.0

@@ -277,7 +277,7 @@ class SupervisorNode(ParameterNode):
             hindrance=self._hindrance(),
             judged=self._state not in _NOT_JUDGED
             and not self._listening.misses(self._heard_at, _SILENCE),
-            flag_stays=lambda: self._is_known_lathe() and self._newest_flag() == flag,
+            flag_stays=lambda: self._newest_flag() == flag,
         )
 
     def _lasted(self, now: float) -> float:
@@ -309,8 +309,10 @@ class SupervisorNode(ParameterNode):
                 self._say_of(self._core.refused('the lathe does not answer'))
         elif self._cut is not None and self._newest_flag() is not None:
             seen = self._seen(self._cut)
-            if seen.hindrance != _STOOD_STILL:  # after which the monitor soon speaks again
-                self._do(self._core.look(seen))
+            # After a standstill the monitor soon speaks again.
+            action = self._core.look(seen) if seen.hindrance != _STOOD_STILL else None
+            if action is not None and self._is_known_lathe():
+                self._do(action)
 
     def _on_accept(self, _request: Any, response: Any) -> Any:
         response.message = 'The lathe is not known yet.'

@@ -82,6 +82,7 @@ class Supervisor:
         self._margin_limit, self._move_early, self._hands_off = margin_limit, move_early, hands_off
         self._hand_at, self._hand = begun, 'I have only just begun to watch'
         self._has_seen_quiet = False
+        self._is_of_before = False  # the flag, of the run before this one
         self._vibration = VibrationHistory()
         self._safe_since = math.nan
         self._warned, self._doubt = False, 1.0
@@ -112,6 +113,7 @@ class Supervisor:
 
     def another_run(self) -> None:
         """The lathe has begun again: what was known of chatter was known of the run before."""
+        self._is_of_before |= not math.isnan(self._alarm_at)
         self._vibration, self._has_seen_quiet, self._ended = VibrationHistory(), False, ''
         self._forget()
 
@@ -283,7 +285,9 @@ class Supervisor:
             moves, self._has_seen_quiet = self.moves, True
             self._forget()
             word = 'move' if moves == 1 else 'moves'
-            self._ended = f'The chatter has ended{when}; {moves} {word}.'
+            if moves or not self._is_of_before:
+                self._ended = f'The chatter has ended{when}; {moves} {word}.'
+        self._is_of_before = False
         if self._ended and not seen.judged:  # by a lathe or a monitor that has begun anew
             return None
         if self._ended:

@@ -77,11 +77,18 @@ def test_a_flag_that_falls_without_a_judgement_is_no_end_of_the_chatter() -> Non
         assert supervisor.look(Seen(5.0, CALM)) is None
 
 
-def test_chatter_of_a_run_before_has_not_ended_in_another() -> None:
+@pytest.mark.parametrize('stays', [False, True])
+def test_chatter_of_a_run_before_has_not_ended_in_another(stays: bool) -> None:
     supervisor = Supervisor(Limits(), Mode.ACT)
     supervisor.look(Seen(1.0, CALM, chatter=True))
     supervisor.another_run()
+    if stays:  # until the monitor, which has begun anew as well, has judged
+        supervisor.look(Seen(1.5, CALM, chatter=True))
     assert supervisor.look(Seen(2.0, CALM)) is None
+    supervisor.look(Seen(3.0, CALM, chatter=True))
+    action = supervisor.look(Seen(4.0, CALM))
+    assert action is not None
+    assert action.sentence == 'The chatter has ended, 1.0 s after the flag; 0 moves.'
 
 
 def test_no_move_is_made_where_the_flag_fell_while_one_was_looked_for() -> None:
