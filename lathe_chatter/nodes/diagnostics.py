@@ -52,7 +52,7 @@ class Diagnostics:
         self._name = node.get_fully_qualified_name()
         self._hardware = self._name.rpartition('/')[0].lstrip('/')
         self._hardware = f'{self._hardware} {hardware}'.strip()
-        self._publisher = node.offer(DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
+        self._publisher = node.advertise(DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         self._shown: list[tuple[str, bytes, str]] = []
 
     def publish(self, statuses: Iterable[Status]) -> None:

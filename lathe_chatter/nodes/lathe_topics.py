@@ -80,11 +80,11 @@ class LatheTopics:
         faster = round(in_real_time * factor) if factor else MAX_HISTORY
         deep = max(in_real_time, min(faster, MAX_HISTORY))
         kept = QoSProfile(depth=deep, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._samples = node.offer(Float64MultiArray, '~/samples', kept)
+        self._samples = node.advertise(Float64MultiArray, '~/samples', kept)
         # Bytes need none of what rclpy asks of a message at each call.
         self._publish_samples = self._samples.handle.publish_raw
         self._scalars = [
-            (node.offer(Float64, topic, QoSProfile(depth=deep)), column)
+            (node.advertise(Float64, topic, QoSProfile(depth=deep)), column)
             for topic, column in _SCALARS.items()
         ]
         # Without a /clock nobody knows simulated time: stamps are the node's then.
@@ -92,8 +92,10 @@ class LatheTopics:
         self._now = None if publish_clock or self._follows else node.get_clock().now
         self._log = node.bounded_log
         self.zero: int | None = None
-        self._joints = node.offer(JointState, '~/joint_states', QoSProfile(depth=10))
-        self._clock = node.offer(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
+        self._joints = node.advertise(JointState, '~/joint_states', QoSProfile(depth=10))
+        self._clock = (
+            node.advertise(Clock, '/clock', QoSProfile(depth=1)) if publish_clock else None
+        )
         self._look_at = self._published_at = 0.0
         self._unread = 0  # ticks since every reader was known to have all of them
         self._size = 0  # bytes of the last

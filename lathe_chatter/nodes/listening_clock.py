@@ -31,12 +31,12 @@ class ListeningClock:
             self._wakings.append(now - self._stood)
         return now - self._stood
 
-    def misses(self, heard_at: float, seconds: float) -> bool:
+    def is_silent(self, heard_at: float, seconds: float) -> bool:
         """Whether nothing has come for so long, or since the node stood still."""
         return self.now() > heard_at + seconds or heard_at < max(self._wakings, default=-math.inf)
 
-    def excuses(self, heard_at: float, seconds: float) -> bool:
-        """Whether that may be for a standstill of the node, less than so long from then.
+    def stood_still_near(self, heard_at: float, seconds: float) -> bool:
+        """Whether a silence since then may be for a standstill of the node, less than so long off.
 
         What comes just after one may have waited for it.
         """

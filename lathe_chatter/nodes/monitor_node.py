@@ -98,10 +98,10 @@ class MonitorNode(ParameterNode):
         self._heard_by_report = self._reported_at = -math.inf
         self._reported_lost, self._was_silent = 0, True
 
-        self._flag_publisher = self.offer(Bool, '~/chatter', _LATCHED)
-        self._state_publisher = self.offer(String, '~/state', _LATCHED)
+        self._flag_publisher = self.advertise(Bool, '~/chatter', _LATCHED)
+        self._state_publisher = self.advertise(String, '~/state', _LATCHED)
         self._figure_publishers = {
-            name: self.offer(Float64, f'~/{name}', QoSProfile(depth=1000)) for name in FIGURES
+            name: self.advertise(Float64, f'~/{name}', QoSProfile(depth=1000)) for name in FIGURES
         }
         self._diagnostics = Diagnostics(self, 'chatter monitor')
         self._flag_publisher.publish(Bool(data=self._flag))

@@ -273,10 +273,8 @@ class OperatedCell:
             case 'back':
                 said = await self._go_back()
             case 'knock':
-                if (
-                    self._heard.values(self._names['lathe'], 'cut').get('guard', GUARD_ON)
-                    != GUARD_ON
-                ):
+                told = self._heard.values(self._names['lathe'], 'cut')
+                if told.get('guard', GUARD_ON) != GUARD_ON:
                     raise LatheChatterError('The cut has ended: nothing was hit.')
                 # One that was killed is on its topic for long still, and nothing answers for it.
                 self.clients.knock(wish['impulse'], there=self._is_alive('lathe'))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -22,7 +23,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.errors import LatheChatterError
 from lathe_chatter.lathe.virtual_lathe import IMPULSE
-from lathe_chatter.nodes.polled_subscription import node_marks
+from lathe_chatter.nodes.polled_subscription import node_gids
 
 _NODES = {
     'monitor': 'chatter_monitor',
@@ -77,7 +78,7 @@ class CellClients:
         self._node, self._put = node, put
         self._types: dict[str, dict[str, int]] = {}
         self._ready: dict[str, float] = {}
-        self._marks: dict[str, frozenset[tuple[int, ...]]] = {}  # of those who were asked
+        self._gids = defaultdict[str, frozenset[tuple[int, ...]]](frozenset)  # of those asked
         self._asking: set[str] = set()
         services = {(who, name): kind for who, kind, name, _ in _SERVICES.values()}
         for who in _DESCRIBED:
@@ -98,9 +99,10 @@ class CellClients:
 
     async def look(self) -> None:
         """Get to know the parameters of those that have come."""
-        now, marks = time.monotonic(), node_marks(self._node)
+        now, gids = time.monotonic(), node_gids(self._node)
         for who in _DESCRIBED:
-            if not marks.get(self.names[who], frozenset()) <= self._marks.get(who, frozenset()):
+            name = self.names[who]
+            if not gids[name] <= self._gids[name]:
                 self.values.pop(who, None)  # another one of its name has come
             if not self._clients[who, 'list_parameters'].service_is_ready():
                 self._ready.pop(who, None)
@@ -114,7 +116,7 @@ class CellClients:
     async def _describe(self, who: str) -> None:
         """Ask a node what parameters it has, and what they are."""
         self._asking.add(who)
-        self._marks[who] = node_marks(self._node).get(self.names[who], frozenset())
+        self._gids[self.names[who]] = node_gids(self._node)[self.names[who]]
         try:
             names = sorted((await self._call(who, 'list_parameters')).result.names)
             described = await self._call(who, 'describe_parameters', names=names)

@@ -112,7 +112,7 @@ class ParameterNode(Node):  # type: ignore[misc]  # rclpy has no type informatio
         """Have something done again and again, each s of a clock that nobody sets."""
         self.create_timer(period, task, clock=self._steady)
 
-    def offer(self, kind: Any, topic: str, qos: QoSProfile) -> Publisher:
+    def advertise(self, kind: Any, topic: str, qos: QoSProfile) -> Publisher:
         """A publisher, of whose quality of service the user may choose some at the start."""
         options = publisher_overrides(self, topic)
         return self.create_publisher(kind, topic, qos, qos_overriding_options=options)

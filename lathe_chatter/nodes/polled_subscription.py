@@ -6,6 +6,7 @@ a quarter of a core. Who takes what has come in one go, some times a second, pay
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -30,20 +31,19 @@ def publisher_names(node: Node, topic: str) -> list[str]:
     return sorted(map(full_name, offers))
 
 
-def node_marks(node: Node) -> dict[str, frozenset[tuple[int, ...]]]:
-    """The marks that DDS gives to each node, by its full name: another one of a name has others.
+def node_gids(node: Node) -> defaultdict[str, frozenset[tuple[int, ...]]]:
+    """By its full name, what DDS knows each node by: another one of that name has another gid.
 
-    They are those of the publisher of parameter events, which every node has. A node that was
-    killed is in the graph for a while.
+    It is that of the publisher of parameter events, which every node has. A node that was killed
+    is in the graph for a while.
 
     Args:
         node: That asks the graph.
     """
-    marks: dict[str, frozenset[tuple[int, ...]]] = {}
+    gids = defaultdict[str, frozenset[tuple[int, ...]]](frozenset)
     for offer in node.get_publishers_info_by_topic('/parameter_events'):
-        name = full_name(offer)
-        marks[name] = marks.get(name, frozenset()) | {tuple(offer.endpoint_gid)}
-    return marks
+        gids[full_name(offer)] |= {tuple(offer.endpoint_gid)}
+    return gids
 
 
 def full_name(offer: TopicEndpointInfo) -> str:

@@ -36,7 +36,7 @@ from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.parameter_tables import SUPERVISOR, ModelSource
-from lathe_chatter.nodes.polled_subscription import PolledSubscription, node_marks
+from lathe_chatter.nodes.polled_subscription import PolledSubscription, node_gids
 from lathe_chatter.nodes.remote_parameters import RemoteParameters
 from lathe_chatter.nodes.supervisor_limits import limits_from, unsuited
 from lathe_chatter.precompile import LATHE_LOOP, MOVE_LOOPS, precompile
@@ -82,7 +82,7 @@ class SupervisorNode(ParameterNode):
         self._listening = ListeningClock()  # of what is missed, and of answers
         self._heard_at = self._lost_at = -math.inf
         self._lost = self._restarts = self._cut_end = -1.0
-        self._marks: frozenset[tuple[int, ...]] = frozenset()  # of the lathe
+        self._gids: frozenset[tuple[int, ...]] = frozenset()  # of the lathe
         self._reports = DiagnosticsListener()
         self._told: dict[str, dict[str, Any]] = {}  # of lathe and monitor
         self._cut_is_new = False  # for the monitor's figures
@@ -109,7 +109,7 @@ class SupervisorNode(ParameterNode):
         ):
             self.create_subscription(kind, topic, hear, qos)
         self._flags = PolledSubscription(self, Bool, 'chatter_monitor/chatter', _LATCHED)
-        self._action = self.offer(String, '~/action', _SENTENCES)
+        self._action = self.advertise(String, '~/action', _SENTENCES)
         self._diagnostics = Diagnostics(self, 'chatter supervisor')
         self.create_service(Trigger, '~/accept', self._on_accept)
         self.every(_LOOK_PERIOD, self._look)
@@ -195,9 +195,9 @@ class SupervisorNode(ParameterNode):
         self._core.another_run()
         self._ask_again()
 
-    def _is_known_lathe(self) -> bool:
-        """Whether none has come since it told what it is: one that comes is asked."""
-        known = node_marks(self).get(self._lathe, frozenset()) <= self._marks
+    def _follow_lathe(self) -> bool:
+        """Ask another lathe that has come what it is; whether none has."""
+        known = node_gids(self)[self._lathe] <= self._gids
         if not known:
             self._begin_again()
         return known
@@ -244,7 +244,7 @@ class SupervisorNode(ParameterNode):
             told = self._told.get(self._lathe, {})
         try:
             if name == self._lathe:
-                self._marks = node_marks(self).get(name, frozenset())
+                self._gids = node_gids(self)[name]
                 self._take_changes(self._told[name])
             self._core.limits = self._limits()
             if told and source != ModelSource.NONE.value:
@@ -276,7 +276,7 @@ class SupervisorNode(ParameterNode):
             lasted=self._lasted(now),
             hindrance=self._hindrance(),
             judged=self._state not in _NOT_JUDGED
-            and not self._listening.misses(self._heard_at, _SILENCE),
+            and not self._listening.is_silent(self._heard_at, _SILENCE),
             flag_stays=lambda: self._newest_flag() == flag,
         )
 
@@ -289,10 +289,9 @@ class SupervisorNode(ParameterNode):
 
     def _hindrance(self) -> str:
         """Why nothing may be done, as the end of a sentence; empty where it may."""
-        silent = self._listening.misses(self._heard_at, _SILENCE)
-        stood_still = self._listening.excuses(self._heard_at, _SILENCE)
+        silent = self._listening.is_silent(self._heard_at, _SILENCE)
         reasons = {
-            _STOOD_STILL: silent and stood_still,
+            _STOOD_STILL: silent and self._listening.stood_still_near(self._heard_at, _SILENCE),
             'nothing comes from the monitor': silent,
             'the monitor does not know the state of the cut': self._state == UNKNOWN,
             'samples were lost': time.monotonic() < self._lost_at + _LOSS,
@@ -304,19 +303,20 @@ class SupervisorNode(ParameterNode):
     def _look(self) -> None:
         if self._answer is not None:
             asked = self._answer[1], _NO_ANSWER
-            if self._listening.misses(*asked) and not self._listening.excuses(*asked):
+            silent = self._listening.is_silent(*asked)
+            if silent and not self._listening.stood_still_near(*asked):
                 self._answer = None
                 self._say_of(self._core.refused('the lathe does not answer'))
         elif self._cut is not None and self._newest_flag() is not None:
             seen = self._seen(self._cut)
             # After a standstill the monitor soon speaks again.
             action = self._core.look(seen) if seen.hindrance != _STOOD_STILL else None
-            if action is not None and self._is_known_lathe():
+            if action is not None and self._follow_lathe():
                 self._do(action)
 
     def _on_accept(self, _request: Any, response: Any) -> Any:
         response.message = 'The lathe is not known yet.'
-        if self._is_known_lathe() and self._cut is not None:
+        if self._follow_lathe() and self._cut is not None:
             done, message, action = self._core.accept(self._seen(self._cut))
             response.success, response.message = done, message
             self._do(action)
@@ -369,7 +369,7 @@ class SupervisorNode(ParameterNode):
 
     def _report(self) -> None:
         """Once a second."""
-        self._is_known_lathe()
+        self._follow_lathe()
         self._remote.ask(self._lathe)
         self._remote.ask(self._monitor)
         self._remote.look()

@@ -260,9 +260,8 @@ class RecordedRun:
                 if np.any(np.abs(series[0] - time) < 1.0)
             }
             # No figure about then: no monitor was there, or it heard nothing.
-            cell['flag'] = {'up': False, 'since': None} if cell['figures'] else None
-            if before and cell['figures']:
-                cell['flag'] = {'up': before[-1].chatter, 'since': before[-1].time}
+            up, since = (before[-1].chatter, before[-1].time) if before else (False, None)
+            cell['flag'] = {'up': up, 'since': since} if cell['figures'] else None
             recommended = cell['figures'].get('recommended_speed_rpm')
             cell['chart'] = self._chart(history, time, recommended)
         return {'closeup': figures, 'cell': cell, 'moment': time}, arrays

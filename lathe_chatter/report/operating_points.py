@@ -149,9 +149,8 @@ def draw_path(axes: Axes, history: History, chart: ChartOf) -> None:
     for before, after in itertools.pairwise(stays):
         if before in here or after in here:
             begin, (x, depth) = _point(before.cut), _point(after.cut)
-            if history.session_at(
-                after.start
-            ).spindle_acceleration:  # the depth steps, the speed is on its way
+            ramps = history.session_at(after.start).spindle_acceleration
+            if ramps:  # the depth steps, the speed is on its way
                 axes.plot((begin[0], begin[0]), (begin[1], depth), color=_WAY, lw=1.2)
                 begin = begin[0], depth
             axes.annotate(

@@ -22,13 +22,13 @@ print('stop me', flush=True)
 while time.monotonic() < begin + 1.5 + 2.0:
     time.sleep(0.01)
 then = clock.now()
-print(then - heard_just_before < 2.0, clock.misses(heard_just_before, 1.0))
-print(clock.excuses(heard_just_before, 1.0))
-print(clock.misses(heard_long_ago, 1.0), clock.excuses(heard_long_ago, 1.0))
-print(clock.misses(then, 1.0))
+print(then - heard_just_before < 2.0, clock.is_silent(heard_just_before, 1.0))
+print(clock.stood_still_near(heard_just_before, 1.0))
+print(clock.is_silent(heard_long_ago, 1.0), clock.stood_still_near(heard_long_ago, 1.0))
+print(clock.is_silent(then, 1.0))
 while clock.now() < then + 30.5:
     time.sleep(0.01)
-print(clock.misses(heard_just_before, 1.0), clock.excuses(heard_just_before, 1.0))
+print(clock.is_silent(heard_just_before, 1.0), clock.stood_still_near(heard_just_before, 1.0))
 """
 
 
