@@ -20,8 +20,10 @@ from lathe_chatter.model.lathe_parameter_table import machine_in_cut
 from lathe_chatter.model.machine_file import MachineDescription, narrowed
 from lathe_chatter.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from lathe_chatter.nodes.lathe_cut_watch import LatheCutWatch
+from lathe_chatter.nodes.listening_clock import ListeningClock
 from lathe_chatter.nodes.monitor_sentences import (
     SENTENCES,
+    SILENCES,
     best_effort,
     clearance,
     details,
@@ -47,7 +49,7 @@ _REPORT_PERIOD = 0.05
 """Simulated seconds from one set of figures to the next; a change of state waits for nothing."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _LEVELS = {'chatter': ERROR, 'watch': WARN, 'forced': WARN}
-_SECOND = 0.9, 1.9  # s from one report to the next, where neither comes late
+_SILENCE = 1.0  # s
 _UNKNOWN = 'unknown'
 _FASTEST_PACE = 100.0
 """Simulated seconds that a lathe cuts in one; and those of a backlog."""
@@ -92,11 +94,11 @@ class MonitorNode(ParameterNode):
         self._since, self._complaint = 'nothing yet', ''
         self._state, self._flag, self._flag_since = _UNKNOWN, False, math.nan
         self._logged_advice, self._mode, self._faults = Advice(), Mode.WAITING, tuple[str, ...]()
-        self._senders, self._silent = list[str](), False  # several senders: nothing is judged
+        self._senders, self._silence = list[str](), ''  # several senders: nothing is judged
         self._heard_at = self._leapt_at = self._newest = self._next_report = -math.inf
         self._figures, self._details = dict[str, float](), dict[str, object]()
-        self._heard_by_report = self._reported_at = -math.inf
-        self._reported_lost, self._was_silent = 0, True
+        self._listening, self._last_listened = ListeningClock(), -math.inf
+        self._reported_lost = 0
 
         self._flag_publisher = self.advertise(Bool, '~/chatter', _LATCHED)
         self._state_publisher = self.advertise(String, '~/state', _LATCHED)
@@ -125,7 +127,9 @@ class MonitorNode(ParameterNode):
         """Take the blocks that have come."""
         rest = _REST_ON_WATCH if self._state == 'watch' else _REST
         self._wake_at = time.monotonic_ns() + rest
+        now = self._listening.now()
         for batch in self._subscription.take():
+            self._last_listened = now
             self._take(batch)
 
     def _take(self, batch: SampleBatch) -> None:
@@ -184,6 +188,7 @@ class MonitorNode(ParameterNode):
         self._subscription.remember_publishers()
         self._since = f'{times[0]:.6f}'
         if order is BlockOrder.FIRST:
+            self._silence = ''
             self._say('listening', f'Listening from {start} on.')
             return True
         if jumped:
@@ -193,7 +198,7 @@ class MonitorNode(ParameterNode):
         else:
             again = f'the lathe started again, and I with it from {start} on'
             self._say('restart', f'At {before:.6f} s: {again}.')
-        self._silent = False
+        self._silence = ''
         self._flag_since = math.nan  # a time of the run before is none of this one
         if self._flag:
             self._say('withdrawn', withdrawn(times[0]))
@@ -205,8 +210,8 @@ class MonitorNode(ParameterNode):
         return True
 
     def _end_silence(self, start: str) -> None:
-        if self._silent:
-            self._silent = False
+        if self._silence:
+            self._silence = ''
             self._say('samples again', f'At {start}: samples come again.')
 
     def _is_mixture(self, now: float) -> bool:
@@ -334,31 +339,35 @@ class MonitorNode(ParameterNode):
             self._say('best effort', best_effort(self._subscription.topic))
         if self._asked is not None and not self._asked.answered:
             self._asked.ask()
-        now = time.monotonic()
-        # A timer that is late fires again soon; and what came while this node stood still waits.
-        is_second = _SECOND[0] < now - self._reported_at < _SECOND[1]
-        silent = self._heard_at == self._heard_by_report and (is_second or self._was_silent)
-        self._reported_at, self._was_silent = now, silent
-        if silent and self._senders:
+        last, silence = self._continuity.last, self._silence_kind()
+        if silence and self._senders:
             self._senders, self._continuity.last = [], None
-        elif silent and not self._silent and self._continuity.last is not None:
-            self._silent, self._figures, self._details = True, {}, {}
+        elif silence and silence != self._silence and last is not None:
+            self._figures, self._details = {}, {}
             self._set_state(_UNKNOWN)
-            self._say('silence', f'At {self._continuity.last:.6f} s: no samples come any more.')
-        if not silent:
-            self._silent = False
+            more = ' any more' if silence == 'silence' else ''
+            self._say(silence, f'At {last:.6f} s: {SILENCES[silence]}{more}.')
+        if not silence:
             self._subscription.remember_publishers()
-        self._diagnostics.publish(self._statuses(silent=silent))
-        self._heard_by_report, self._reported_lost = self._heard_at, self._continuity.lost
+        self._silence = silence
+        self._diagnostics.publish(self._statuses())
+        self._reported_lost = self._continuity.lost
 
-    def _statuses(self, *, silent: bool = False) -> list[Status]:
+    def _silence_kind(self) -> str:
+        """Of `SILENCES`; what came while this node stood still waits, and is none."""
+        if self._listening.now() <= self._last_listened + _SILENCE:
+            return ''
+        stood = self._listening.stood_still_near(self._last_listened, _SILENCE)
+        return 'standstill' if stood else 'silence'
+
+    def _statuses(self) -> list[Status]:
         since = {'flag since, s': self._flag_since} if math.isfinite(self._flag_since) else {}
         cut = {'state': self._state, 'flag': self._flag, **since, **self._figures, **self._details}
         # Whether the chatter of a flag that is up goes on is not known then.
-        level = WARN if self._silent and self._flag else _LEVELS.get(self._state, OK)
-        return [self._samples_status(silent=silent), Status('cut', level, self._state, cut)]
+        level = WARN if self._silence and self._flag else _LEVELS.get(self._state, OK)
+        return [self._samples_status(), Status('cut', level, self._state, cut)]
 
-    def _samples_status(self, *, silent: bool) -> Status:
+    def _samples_status(self) -> Status:
         heard = self._continuity
         values = {
             'samples': heard.samples,
@@ -373,8 +382,8 @@ class MonitorNode(ParameterNode):
         if self._senders:
             several = two_publishers(self._senders, self._subscription.topic)
             return Status('samples', ERROR, several, values)
-        if silent:
-            return Status('samples', WARN, 'no samples come', values)
+        if self._silence:
+            return Status('samples', WARN, SILENCES[self._silence], values)
         if self._faults:
             return Status('samples', WARN, ', '.join(self._faults), values)
         if heard.lost > self._reported_lost:

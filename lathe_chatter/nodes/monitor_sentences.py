@@ -29,6 +29,11 @@ class Sentence(NamedTuple):
 TOOL_FREQUENCY = 'natural frequency of the tool as heard, Hz'
 """In the diagnostics, where it has taken the place of the told one."""
 _AT = r'At \d+\.\d{6} s: '
+SILENCES = {
+    'silence': 'no samples come',
+    'standstill': 'this node stood still, and does not hear the samples yet',
+}
+"""What the diagnostics say where no sample came for a second."""
 SENTENCES = {
     'listening': Sentence(
         'info',
@@ -53,7 +58,12 @@ SENTENCES = {
     'silence': Sentence(
         'warning',
         _AT + r'no samples come any more\.',
-        'no sample came for a second, and some had before',
+        'no sample came for a second, some had before, and this node did not stand still of late',
+    ),
+    'standstill': Sentence(
+        'warning',
+        _AT + rf'{SILENCES["standstill"]}\.',
+        'no sample came for a second, some had before, and they may wait since a standstill',
     ),
     'samples again': Sentence(
         'info',

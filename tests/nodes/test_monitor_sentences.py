@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -86,6 +87,12 @@ def shifted(samples: Array, seconds: float) -> Array:
 def listening(shop: Shop) -> None:
     shop.monitor()
     shop.send(shop.bench.talk(Float64MultiArray, '/lathe/samples'), chatters(1.0))
+
+
+def standstill(shop: Shop) -> None:
+    listening(shop)
+    shop.says('listening')
+    time.sleep(1.0)  # its executor is this thread
 
 
 def resumed(shop: Shop) -> None:
@@ -224,6 +231,7 @@ STORIES: dict[str, Callable[[Shop], None]] = {
     'withdrawn': restart_while_flagged,
     'jump': jump,
     'silence': listening,
+    'standstill': standstill,
     'samples again': resumed,
     'two publishers': two_publishers,
     'best effort': best_effort,
@@ -331,6 +339,6 @@ def test_reports_that_follow_soon_know_of_no_silence(
     bench.spin_until(lambda: node._continuity.samples == 5000, 'all samples')
     for _ in range(3):
         node._report()
-    assert not node._silent
+    assert not node._silence
     (samples, _) = node._statuses()
     assert samples.message == 'all samples came'

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import signal
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,7 @@ def test_a_killed_lathe_is_missed_and_the_next_one_followed(cell: Cell) -> None:
         return [*parameter_history(noted(cell.run(), f'{PARAMETERS}/lathe'))]
 
     cell.wait(lives, 'the parameters')
+    cell.wait_for_samples(1000)  # a monitor that has just loaded its loops stood still for that
     since, known = reports.count(), len(cell.states)
     cell.nodes.kill('/lathe')
     cell.wait(lambda: cell.states[-1].data == 'unknown', 'silence noticed')
@@ -239,3 +241,20 @@ def test_samples_lost_soon_after_a_kill_are_no_other_run(cell: Cell) -> None:
     cell.wait(lambda: reports.value(HEARD, 'gaps') == '1', 'the gap')
     assert reports.value(HEARD, 'restarts of the lathe') == '1'
     assert all(flag.data for flag in cell.flags[flags:])
+
+
+def test_a_monitor_that_stood_still_does_not_call_the_lathe_silent(cell: Cell) -> None:
+    """DDS may need seconds to deliver to it again; nothing came, and that is for itself."""
+    cell.start(*CHATTER)
+    cell.wait(lambda: cell.states and cell.states[-1].data == 'chatter', 'chatter')
+    cell.nodes.signal('/chatter_monitor', signal.SIGSTOP)
+    cell.wait_for_samples(blocks=1000)
+    cell.nodes.kill('/lathe')
+    cell.nodes.signal('/chatter_monitor', signal.SIGCONT)
+    here = 'this node stood still, and does not hear the samples yet'
+    said = partial(cell.reports.sentences, 'chatter_monitor')
+    cell.wait(lambda: any(here in sentence for sentence in said()), 'the sentence')
+    cell.wait(lambda: cell.states[-1].data == 'unknown', 'the state')
+    assert not any('no samples come' in sentence for sentence in said())
+    heard = partial(cell.reports.statuses, HEARD, 0)
+    cell.wait(lambda: heard()[-1].message == here, 'the diagnostics')
