@@ -192,7 +192,7 @@ class SupervisorNode(ParameterNode):
 
     def _begin_again(self) -> None:
         """Another run, of what may be another machine with another cut."""
-        self._core.another_run()
+        self._say_of(self._core.another_run())
         self._ask_again()
 
     def _follow_lathe(self) -> bool:

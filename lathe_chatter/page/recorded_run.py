@@ -262,6 +262,8 @@ class RecordedRun:
             # No figure about then: no monitor was there, or it heard nothing.
             up, since = (before[-1].chatter, before[-1].time) if before else (False, None)
             cell['flag'] = {'up': up, 'since': since} if cell['figures'] else None
+            states = [each for at, each in history.states if at <= time and each != 'chatter']
+            cell['state'] = states[-1] if states else None  # of chatter the flag tells
             recommended = cell['figures'].get('recommended_speed_rpm')
             cell['chart'] = self._chart(history, time, recommended)
         return {'closeup': figures, 'cell': cell, 'moment': time}, arrays

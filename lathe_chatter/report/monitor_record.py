@@ -85,6 +85,10 @@ class MonitorRecord:
         values = [message_of(each).data for each in found]
         return np.array([[sum(self._time(each)) for each in found], values], dtype=float)
 
+    def states(self) -> list[tuple[float, str]]:
+        """What the cut did, from when on, s."""
+        return [(sum(self._time(each)), message_of(each).data) for each in self._of('state')]
+
     def flags(self, estimates: dict[str, Array]) -> list[Flag]:
         """Every change of the flag, and where a monitor was started anew, with its flag down."""
         flags: list[Flag] = []

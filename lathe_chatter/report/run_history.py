@@ -115,6 +115,7 @@ class History:
         knocks: On the tool, in order.
         flags: Of the monitor, in order.
         estimates: Growth rate, frequency and so on by name: simulated times and values (2, m).
+        states: What the monitor said that the cut does, from when on, s.
         remarks: What else is to be known, sentences: steps of the clock, contradictions.
     """
 
@@ -125,6 +126,7 @@ class History:
     knocks: list[Knock] = field(default_factory=list)
     flags: list[Flag] = field(default_factory=list)
     estimates: dict[str, Array] = field(default_factory=dict)
+    states: list[tuple[float, str]] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -309,6 +311,7 @@ def read_history(path: Path, topic: str | None = None) -> History:
         knocks=[event for event in events if isinstance(event, Knock)],
         flags=monitor.flags(estimates),
         estimates=estimates,
+        states=monitor.states(),
         remarks=_remarks(cuts, logger_of(topic.rsplit('/', 1)[0])),
     )
 

@@ -106,16 +106,25 @@ class Supervisor:
         """Somebody else has changed something: hands off, and what was planned is forgotten."""
         on_the_way = math.isfinite(self._target)
         self._hand = 'somebody else has just changed something'
-        self._hand_at, self._offer, self._target, self._refusal = time, None, math.nan, ''
+        self._hand_at, self._target, self._refusal = time, math.nan, ''
         if not on_the_way:
-            return None
+            return self._withdraw(self._hand)
         return Action('Somebody else changes the cut: the speed stays where it is on its way.')
 
-    def another_run(self) -> None:
+    def another_run(self) -> Action | None:
         """The lathe has begun again: what was known of chatter was known of the run before."""
         self._is_of_before |= not math.isnan(self._alarm_at)
         self._vibration, self._has_seen_quiet, self._ended = VibrationHistory(), False, ''
+        withdrawn = self._withdraw('the lathe has begun again')
         self._forget()
+        return withdrawn
+
+    def _withdraw(self, reason: str) -> Action | None:
+        """What was offered, if anything was: who reads the offer must not think that it stands."""
+        if self._offer is None:
+            return None
+        self._offer, self._said = None, ''
+        return Action(f'What was offered is withdrawn, for {reason}.')
 
     def refused(self, reason: str) -> Action:
         """The lathe did not say that it did what was asked: no more is tried, for that reason."""
@@ -130,13 +139,15 @@ class Supervisor:
         cut, action = self._offer
         hindrance = self._hindrance(seen)
         if hindrance or cut != seen.cut:
-            self._offer = None
-            return False, f'Nothing is done, for {hindrance or "the cut has changed"}.', None
+            reason = hindrance or 'the cut has changed'
+            return False, f'Nothing is done, for {reason}.', self._withdraw(reason)
         return True, action.sentence, self._begin(action, seen)
 
     def look(self, seen: Seen) -> Action | None:
         """What is to be said or done now; to be called some fifty times a second."""
         self._vibration.note(seen.time, seen.amplitude)
+        if self._offer is not None and self._offer[0] != seen.cut:
+            return self._withdraw('the cut has changed')
         if math.isfinite(self._target):
             return self._go_on(seen)
         if seen.chatter:
@@ -149,8 +160,6 @@ class Supervisor:
         self._ended = ''
         if math.isnan(self._alarm_at):
             self._alarm_at = seen.time
-        if self._offer is not None and self._offer[0] != seen.cut:
-            self._offer = None
         if hindrance := self._hindrance(seen):
             self._offer = None
             return self._once(f'{_figures(seen)}: nothing is done, for {hindrance}.')
@@ -189,12 +198,12 @@ class Supervisor:
                 changes = move.changes_from(seen.cut)
                 said = f'{why}: {{}} set {change_words(changes, seen.cut)} ({expectation(move)})'
                 settling = min(SETTLING - _EFOLDS / min(move.growth_rate, -0.1), _LONGEST)
-                return self._decide(seen, Action(said, changes, settling=settling), move.cut)
+                return self._decide(seen, Action(said, changes, settling=settling))
         new = ' that was not tried' if self._tried else ''
         nothing = f'no move within the limits{new} is predicted to help'
         return self._once(f'{why}: {nothing}; a person has to decide.')
 
-    def _decide(self, seen: Seen, action: Action, cut: Cut | None = None) -> Action | None:
+    def _decide(self, seen: Seen, action: Action) -> Action | None:
         """Act, or say what would be done, as the mode has it."""
 
         def said(who: str, end: str) -> str:
@@ -203,7 +212,6 @@ class Supervisor:
         self._offer = None
         if self.mode is Mode.SHADOW:
             return self._once(said('I would', ', but only watch.'))
-        self._tried += [cut] if cut is not None else []
         spent = self.moves >= self.limits.most_moves and not action.stop
         if self.mode is Mode.ACT and not spent:
             return self._begin(replace(action, sentence=said('I', '.')), seen)
@@ -215,6 +223,7 @@ class Supervisor:
     def _begin(self, action: Action, seen: Seen) -> Action:
         """Do it: at once, or the first step of a ramp."""
         self._offer, self._said = None, ''
+        self._tried.append(seen.cut.with_changes(**action.changes))
         self.moves += 1
         self._at_move = seen.amplitude
         self._settling = math.inf if action.stop else action.settling

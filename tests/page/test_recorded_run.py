@@ -102,6 +102,9 @@ def test_a_moment_has_the_cut_the_flag_and_the_frequency_of_then(run: Path) -> N
     assert peak * figures['hertz'] == pytest.approx(cell['figures']['frequency'], rel=0.02)
     before, _ = look(shown, do='at', time=2.0)
     assert before['cell']['flag'] == {'up': False, 'since': None}
+    assert before['cell']['state'] == 'stable'
+    first, _ = look(shown, do='at', time=0.01)
+    assert first['cell']['state'] in {None, 'unknown'}
     assert before['closeup']['depth'] == 0.0005
 
 
@@ -294,7 +297,7 @@ def test_what_is_not_read_yet_is_said_to_be_so(run: Path, tmp_path: Path) -> Non
         assert browser.text('#at-text').startswith('about ')
         assert 'come when all is read' in browser.text('#chart-text')
         asyncio.run_coroutine_threadsafe(shown.read(), loop).result(PATIENCE)
-        browser.until(f'["no chatter", "CHATTER"].includes({lamp})', 'the lamp')
+        browser.until(f'["stable", "CHATTER"].includes({lamp})', 'the lamp')
         browser.until('document.querySelector("#clock").textContent === "12.000 s"', 'the end')
         browser.until('document.querySelector("#chart-text").textContent.includes("mm")', 'it')
         assert browser.run('run.at') == pytest.approx(12.0)

@@ -52,6 +52,21 @@ SAID = {
             'somebody accepts, and there is no offer, or none any more',
             f'{CORE}::test_an_offer_lapses_when_somebody_changes_the_cut',
         ),
+        'the lathe has begun again': (
+            'its times have gone back, or it is another one',
+            f'{CORE}::test_an_offer_of_a_run_before_does_not_stand_in_another',
+        ),
+        'the cut has changed': (
+            'it is not the one for which the offer was made',
+            (
+                f'{CORE}::'
+                'test_an_offer_is_not_accepted_for_another_cut_or_while_something_is_in_the_way'
+            ),
+        ),
+        'What was offered is withdrawn, for {}.': (
+            'an offer was waiting to be accepted, and cannot be any more',
+            f'{CORE}::test_an_offer_lapses_when_somebody_changes_the_cut',
+        ),
         'Nothing is done, for {}.': (
             'somebody accepts an offer that was for another cut, or something is in the way',
             (
@@ -70,7 +85,7 @@ SAID = {
         '{}, {}: {} stop': ('the same: it has the lathe paused, or would', STOPPED),
         '{}: {} set {} ({})': ('it asks the lathe for these changes, or would', CURED),
         ' that was not tried': (
-            'against this chatter a move was made or offered',
+            'against this chatter a move was made',
             f'{CORE}::test_after_moves_that_were_no_cure_nothing_is_said_of_those_that_were_made',
         ),
         'no move within the limits{} is predicted to help': (

@@ -139,6 +139,8 @@ def test_an_offer_lapses_when_somebody_changes_the_cut() -> None:
     there = chattering(Mode.ASK)
     there.run(0.3)
     there.set_by_hand(spindle_speed_rpm=3010.0)
+    withdrawn = 'What was offered is withdrawn, for somebody else has just changed something.'
+    assert withdrawn in there.said
     there.run(0.1)
     assert there.accept() == (False, 'Nothing is waiting to be accepted.')
 
@@ -151,9 +153,35 @@ def test_an_offer_is_not_accepted_for_another_cut_or_while_something_is_in_the_w
         there = chattering(Mode.ASK)
         there.run(0.3)
         seen = replace(there.seen(), **changed)  # type: ignore[arg-type]
-        assert there.supervisor.accept(seen) == (False, said, None)
+        done, why, action = there.supervisor.accept(seen)
+        assert (done, why) == (False, said)
+        assert action is not None
+        assert action.sentence == said.replace('Nothing is done', 'What was offered is withdrawn')
         again = there.supervisor.accept(there.seen())
         assert again == (False, 'Nothing is waiting to be accepted.', None)
+
+
+def test_an_offer_of_a_run_before_does_not_stand_in_another() -> None:
+    there = chattering(Mode.ASK)
+    there.run(0.3)
+    action = there.supervisor.another_run()
+    assert action is not None
+    assert action.sentence == 'What was offered is withdrawn, for the lathe has begun again.'
+    assert there.supervisor.another_run() is None
+
+
+def test_what_was_offered_and_withdrawn_was_not_tried_and_is_offered_again() -> None:
+    there = chattering(Mode.ASK)
+    there.run(0.3)
+    offered = there.said[-1]
+    there._disturb = lambda _there, seen: replace(seen, hindrance='samples were lost')
+    there.run(0.1)
+    assert 'nothing is done, for samples were lost' in there.said[-1]
+    there._disturb = lambda _there, seen: seen
+    there.run(2.5)
+    speed = offered.split(' set spindle_speed_rpm from 3000 to ')[1].split()[0]
+    assert f' set spindle_speed_rpm from 3000 to {speed} ' in there.said[-1]
+    assert '~/accept does it' in there.said[-1]
 
 
 def test_a_hand_amid_a_ramp_leaves_the_speed_where_it_is() -> None:
