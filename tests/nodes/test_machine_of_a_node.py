@@ -12,6 +12,7 @@ from support.node_processes import NodeProcesses, Reports, Samples
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.model.machine_file import load_machine, shipped_machines
 from lathe_chatter.recording import read_run, resimulate, verify
+from lathe_chatter.recording.provenance import PARAMETERS
 
 
 @pytest.mark.parametrize('machine', sorted(shipped_machines()))
@@ -31,6 +32,9 @@ def test_a_cell_has_the_machine_of_a_file(
     answer = bench.call(GetParameters, '/lathe/get_parameters', asked)
     assert answer.values[0].double_value == load_machine(machine).cut.depth_of_cut
     bench.spin_until(lambda: 'Listening from' in nodes.said(), 'the monitor')
+    # It asks the lathe beside what it records; a run opens while it is being recorded.
+    noted = lambda: {note.name for note in read_run(run).notes()}  # noqa: E731
+    bench.spin_until(lambda: f'{PARAMETERS}/lathe' in noted(), 'the parameters in the record')
     nodes.interrupt('/lathe')
     nodes.interrupt('/run_recorder')
     assert not [finding.text for finding in verify(run).findings if finding.loss]
