@@ -127,9 +127,8 @@ class MonitorNode(ParameterNode):
         """Take the blocks that have come."""
         rest = _REST_ON_WATCH if self._state == 'watch' else _REST
         self._wake_at = time.monotonic_ns() + rest
-        now = self._listening.now()
+        self._listening.now()  # a clock that nobody reads takes that for a standstill
         for batch in self._subscription.take():
-            self._last_listened = now
             self._take(batch)
 
     def _take(self, batch: SampleBatch) -> None:
@@ -162,6 +161,7 @@ class MonitorNode(ParameterNode):
         """Notice lost samples and another lathe; whether the samples can be judged."""
         now, heard_at = time.monotonic(), self._heard_at
         before, self._heard_at = self._continuity.last, now
+        self._last_listened = self._listening.now()
         if self._senders:
             self._follow_mixture(times, now)
             return False
@@ -177,11 +177,10 @@ class MonitorNode(ParameterNode):
         order = self._continuity.join(times, is_another)
         self._pace.follow(times, sent, begins=order in {BlockOrder.FIRST, BlockOrder.RESTART})
         start = f'{times[0]:.6f} s'
-        if order is BlockOrder.CONTIGUOUS:
-            self._end_silence(start)
-            return True
         if order is BlockOrder.GAP:
             self._say('lost', f'At {before:.6f} s: the samples up to {start} did not come.')
+        if order in {BlockOrder.CONTIGUOUS, BlockOrder.GAP}:
+            self._end_silence(start)
             return True
         if order is BlockOrder.RESTART and self._is_mixture(now):
             return False

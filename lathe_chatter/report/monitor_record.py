@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -81,13 +81,11 @@ class MonitorRecord:
 
     def series(self, name: str) -> Array:
         """A figure over time (2, m)."""
-        found = self._of(name)
-        values = [message_of(each).data for each in found]
-        return np.array([[sum(self._time(each)) for each in found], values], dtype=float)
+        return np.array(self.said(name), dtype=float).reshape(-1, 2).T
 
-    def states(self) -> list[tuple[float, str]]:
-        """What the cut did, from when on, s."""
-        return [(sum(self._time(each)), message_of(each).data) for each in self._of('state')]
+    def said(self, name: str) -> list[tuple[float, Any]]:
+        """When it said what on one of its topics, s."""
+        return [(sum(self._time(each)), message_of(each).data) for each in self._of(name)]
 
     def flags(self, estimates: dict[str, Array]) -> list[Flag]:
         """Every change of the flag, and where a monitor was started anew, with its flag down."""

@@ -311,7 +311,7 @@ def read_history(path: Path, topic: str | None = None) -> History:
         knocks=[event for event in events if isinstance(event, Knock)],
         flags=monitor.flags(estimates),
         estimates=estimates,
-        states=monitor.states(),
+        states=monitor.said('state'),
         remarks=_remarks(cuts, logger_of(topic.rsplit('/', 1)[0])),
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Bool, Float64MultiArray
+from std_msgs.msg import Bool, Float64MultiArray, String
 from support.node_bench import LATCHED, Bench
 
 from lathe_chatter.array_types import Array
@@ -342,3 +342,31 @@ def test_reports_that_follow_soon_know_of_no_silence(
     assert not node._silence
     (samples, _) = node._statuses()
     assert samples.message == 'all samples came'
+
+
+def test_the_first_block_after_a_silence_ends_it_also_where_samples_are_missing(
+    bench: Bench, start: Callable[..., Any]
+) -> None:
+    shop = Shop(bench, start)
+    publisher = flagged(shop)
+    shop.says('silence')
+    shop.send(publisher, shifted(chatters(0.1)[:BLOCK], 2.5))
+    shop.says('lost')
+    shop.says('samples again')
+
+
+def test_of_samples_that_cannot_be_read_nothing_is_known(
+    bench: Bench, start: Callable[..., Any]
+) -> None:
+    shop = Shop(bench, start)
+    publisher = flagged(shop)
+    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
+    bench.spin_until(lambda: states and states[-1].data == 'chatter', 'what is known')
+    without_time = encode_block(chatters(0.1)[:BLOCK, 1:], SAMPLE_COLUMNS[1:])
+
+    def is_unknown() -> bool:
+        publisher.publish(without_time)
+        return bool(states[-1].data == 'unknown')
+
+    bench.spin_until(is_unknown, 'that nothing is known')
+    assert shop.flags[-1].data
