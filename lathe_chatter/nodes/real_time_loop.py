@@ -64,7 +64,7 @@ class Pacer:
         patience: The most that may be caught up in one go, ns of the clock.
         keeps_all: Whether the excess is not given up but made later: where the clock is
             another's simulated time, all of it counts.
-        lag: What was given up since the start, ns of the clock.
+        lag: Simulated time that was given up since the start, ns.
         overruns: How often something was given up.
     """
 
@@ -97,7 +97,7 @@ class Pacer:
 
     def skip(self, now: int) -> None:
         """Give up all that is due: the clock has jumped."""
-        self.lag += self.lateness(now)
+        self.lag += self.lateness(now) * self.factor
         self.overruns += 1
         self.start(now)
 
@@ -120,7 +120,7 @@ class Pacer:
             if not self.keeps_all:
                 excess = (ticks - allowed) * self.period
                 self._origin = (self._origin or 0.0) + excess
-                self.lag += excess
+                self.lag += (ticks - allowed) * self.tick
                 self.overruns += 1
             ticks = allowed
         self._done += ticks

@@ -18,7 +18,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not there')
 pytest.importorskip('domain_coordinator', reason='domain_coordinator is not there')
-from domain_coordinator import domain_id
+from support.domains import own_domain
 
 from lathe_chatter.cli.main import main
 from lathe_chatter.recording import read_run
@@ -37,7 +37,7 @@ steps:
 
 @pytest.fixture
 def environment() -> Any:
-    with domain_id() as domain:
+    with own_domain() as domain:
         yield {
             **os.environ,
             'ROS_DOMAIN_ID': str(domain),

@@ -14,13 +14,13 @@ from typing import Any
 # Before rclpy is imported anywhere: the tests of one machine must not meet those of another.
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-import domain_coordinator
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from support.browser import Browser
+from support.domains import own_domain
 from support.node_bench import Bench
 from support.node_processes import NodeProcesses
 from support.page_cell import Page, looking_at
@@ -35,12 +35,12 @@ itself for ever, where the participant of a test goes meanwhile (`node_main.exit
 SpinUntil = Callable[..., None]
 
 
-@pytest.fixture(scope='session')
+@pytest.fixture(scope='module')
 def domain() -> Iterator[int]:
     """A ROS domain that no other test process on this machine uses."""
-    with domain_coordinator.domain_id() as number:
+    with own_domain() as number:
         os.environ['ROS_DOMAIN_ID'] = str(number)
-        yield int(number)
+        yield number
 
 
 @pytest.fixture

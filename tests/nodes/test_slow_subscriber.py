@@ -52,7 +52,7 @@ def test_readers_that_do_not_read_slow_nothing_and_cost_nobody_a_sample(
     stuck(QoSProfile(depth=KEPT, reliability=reliable, durability=latched))
     # Nobody is served before all are there.
     nodes.start('lathe', 'real_time_factor:=1.5', f'{DEPTH}:={2 * KEPT}', 'await_readers:=4')
-    follow(bench, reports, samples, REFUSED + KEPT // 4, factor=1.5)
+    follow(bench, reports, samples, REFUSED + KEPT // 4)
     (times,) = samples.runs()
     assert times[0] == 1e-4
 
@@ -66,7 +66,7 @@ def test_a_process_that_is_stopped_slows_nothing_and_says_what_it_missed(
     nodes.start('lathe', 'await_readers:=2')
     bench.spin_until(lambda: states and states[-1].data != 'unknown', 'a known state')
     monitor.send_signal(signal.SIGSTOP)
-    follow(bench, reports, samples, KEPT + KEPT // 4, factor=1.0)
+    follow(bench, reports, samples, KEPT + KEPT // 4)
     known = len(states)
     monitor.send_signal(signal.SIGCONT)
     bench.spin_until(
@@ -95,15 +95,13 @@ def test_a_lathe_that_is_faster_than_its_readers_slows_down_and_loses_nothing(
     assert float(reports.value(PACE, 'lag given up, s')) > 0.0
 
 
-def follow(
-    bench: Bench, reports: Reports, samples: Samples, blocks: int, *, factor: float
-) -> None:
+def follow(bench: Bench, reports: Reports, samples: Samples, blocks: int) -> None:
     """Hear so many more blocks: nothing is lost, and the lathe waits for nobody."""
     before = pace(bench, reports)
     target = len(samples) + blocks
     bench.spin_until(lambda: len(samples) >= target, 'more samples than anybody keeps')
     after = pace(bench, reports)
-    cut = (after['ticks'] - before['ticks']) * TICK / factor
+    cut = (after['ticks'] - before['ticks']) * TICK
     # What the machine has no time for is given up too. But a writer that waits for a reader does
     # so for 0.1 s: 49 of 50 ticks would be given up at least.
     assert after['lag given up, s'] - before['lag given up, s'] < 9.0 * cut
