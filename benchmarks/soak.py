@@ -3,8 +3,8 @@
     python benchmarks/soak.py [--runs 10] [--busy 3] [--cores 1] [ARGUMENTS OF PYTEST ...]
 
 The last `--busy` of the runs share the machine with `--cores` processes that count without end.
-One line a run: its counts, time and the tests that failed; then a line of all. The exit code is 1
-if any test failed in any run.
+One line a run: its counts, time and the tests that failed, with why; then a line of all. The exit
+code is 1 if any test failed in any run.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def one_run(words: Sequence[str], cores: int) -> tuple[str, list[str], float, bo
         began = time.monotonic()
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     seconds = time.monotonic() - began
-    failed = re.findall(r'^(?:FAILED|ERROR) (\S+)', done.stdout, re.MULTILINE)
+    failed = re.findall(r'^(?:FAILED|ERROR) .*|^E  .*', done.stdout, re.MULTILINE)
     *_, counts = [line for line in done.stdout.splitlines() if line.strip()] or [done.stderr]
     return counts.strip('= '), failed, seconds, done.returncode == 0
 
@@ -51,7 +51,9 @@ def main() -> int:
         fine += passed
         times.append(seconds)
         beside = f', {cores} core busy' if cores else ''
-        print(f'run {number + 1}{beside}: {seconds:.0f} s: {counts}', *failed, flush=True)
+        print(
+            f'run {number + 1}{beside}: {seconds:.0f} s: {counts}', *failed, sep='\n  ', flush=True
+        )
     print(
         f'{fine} of {options.runs} runs without a failure, {options.busy} of the {options.runs} '
         f'beside {options.cores} busy core; {min(times):.0f} to {max(times):.0f} s each'
