@@ -18,34 +18,34 @@ usual, calls = module.{kind}._report, []
 
 def failing(self, *args, **options):
     calls.append(1)
-    if len(calls) > 2:
+    if len(calls) > 2 and {ready}:
         raise RuntimeError('what a callback may raise')
     return usual(self, *args, **options)
 
 module.{kind}._report = failing
 module.main()
 """
-"""A node one of whose callbacks raises, after two seconds of recording."""
+"""A node one of whose callbacks raises, after two seconds, once there is something to record."""
 
 
 @pytest.mark.parametrize(
-    ('module', 'kind', 'parameter'),
+    ('module', 'kind', 'parameter', 'ready'),
     [
-        ('recorder_node', 'RecorderNode', 'output'),
-        ('lathe_node', 'LatheNode', 'record'),
-        ('composition', 'MonitorNode', 'run_recorder:output'),
+        ('recorder_node', 'RecorderNode', 'output', 'self.messages_of("/lathe/samples")'),
+        ('lathe_node', 'LatheNode', 'record', 'self.samples_taken'),
+        ('composition', 'MonitorNode', 'run_recorder:output', 'self._continuity.samples'),
     ],
     ids=['recorder', 'record', 'cell'],
 )
 def test_a_run_whose_writer_dies_of_an_error_says_so(
-    module: str, kind: str, parameter: str, bench: Bench, nodes: NodeProcesses
+    module: str, kind: str, parameter: str, ready: str, bench: Bench, nodes: NodeProcesses
 ) -> None:
     samples = Samples(bench)
     run = nodes.folder / 'run'
     if module == 'recorder_node':
         nodes.start('lathe')
         bench.spin_until(lambda: len(samples), 'samples')
-    code = FAILING.format(module=module, kind=kind)
+    code = FAILING.format(module=module, kind=kind, ready=ready)
     command = [sys.executable, '-c', code, '--ros-args', '-p', f'{parameter}:={run}']
     process = nodes.start_program('/failing', command)
     assert process.wait(120) == 1
