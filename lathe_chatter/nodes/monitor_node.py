@@ -97,7 +97,7 @@ class MonitorNode(ParameterNode):
         self._senders, self._silence = list[str](), ''  # several senders: nothing is judged
         self._heard_at = self._leapt_at = self._newest = self._next_report = -math.inf
         self._figures, self._details = dict[str, float](), dict[str, object]()
-        self._listening, self._last_listened = ListeningClock(), -math.inf
+        self._listening = ListeningClock()  # to the samples
         self._reported_lost = 0
 
         self._flag_publisher = self.advertise(Bool, '~/chatter', _LATCHED)
@@ -161,7 +161,7 @@ class MonitorNode(ParameterNode):
         """Notice lost samples and another lathe; whether the samples can be judged."""
         now, heard_at = time.monotonic(), self._heard_at
         before, self._heard_at = self._continuity.last, now
-        self._last_listened = self._listening.now()
+        self._listening.hear()
         if self._senders:
             self._follow_mixture(times, now)
             return False
@@ -354,9 +354,9 @@ class MonitorNode(ParameterNode):
 
     def _silence_kind(self) -> str:
         """Of `SILENCES`; what came while this node stood still waits, and is none."""
-        if self._listening.now() <= self._last_listened + _SILENCE:
+        if not self._listening.misses(_SILENCE):
             return ''
-        stood = self._listening.stood_still_near(self._last_listened, _SILENCE)
+        stood = self._listening.stood_still_near(self._listening.heard_at, _SILENCE)
         return 'standstill' if stood else 'silence'
 
     def _statuses(self) -> list[Status]:

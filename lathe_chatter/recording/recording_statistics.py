@@ -30,6 +30,8 @@ _MAX_BLOCKS = 1000
 """Blocks about which it is known when they came, to date other messages by."""
 _MIN_SILENCE = 0.1
 """s without a block that count as silence, where blocks usually come more often."""
+_MISSED_RATIO = 2.0
+"""Times as long as usual that a lathe whose blocks come seldom may take before it is silent."""
 _SILENCE_RATIO = 10.0
 """So many times longer than usual must a silence be."""
 
@@ -58,7 +60,8 @@ class SamplesReceived:
         continuity: Counts samples, gaps, lost samples and restarts.
         first: Simulated time of the first sample, s; None before it.
         head: Samples that the lathe took before the first one that came.
-        silent: Whether none came between the last two looks, though some had before.
+        silent: Whether none came since the last look; where they come seldom, for twice as long as
+            usual.
         silences: How often it published nothing for much longer than usual.
         longest: The longest time from one block to the next, s.
         pauses: Simulated times before and after what the recorder left out in pauses, s.
@@ -83,6 +86,7 @@ class SamplesReceived:
     _decoder: SampleDecoder = field(default_factory=SampleDecoder)
     _published: int = 0
     _seen: int = 0
+    _missed: int = 0
     _paused: bool = False
     _usual: float = 0.0
     _came: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_MAX_BLOCKS))
@@ -136,8 +140,9 @@ class SamplesReceived:
         return any(each.order is BlockOrder.RESTART for each in self.discontinuities)
 
     def look(self, *, awaited: bool) -> None:
-        """Notice from time to time whether samples have come, where they are awaited."""
-        self.silent = awaited and self.continuity.samples == self._seen
+        """Notice once a second whether samples have come, where they are awaited."""
+        self._missed = self._missed + 1 if self.continuity.samples == self._seen else 0
+        self.silent = awaited and self._missed > _MISSED_RATIO * self._usual
         self._seen = self.continuity.samples
 
     def pause(self) -> None:

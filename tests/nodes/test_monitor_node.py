@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,9 @@ class Machine:
             self._publisher.publish(encode_block(samples[k : k + BLOCK]))
             self._bench.executor.spin_once(timeout_sec=0.01)
 
+    def cut_at_once(self, seconds: float) -> None:
+        self._publisher.publish(encode_block(self.lathe.advance(round(seconds * 1e4))))
+
     def cut(self, seconds: float) -> None:
         self.send(self.lathe.advance(round(seconds * 1e4)))
 
@@ -62,6 +66,33 @@ class Machine:
 def machine(start: Callable[..., Any], bench: Bench) -> Callable[[Cut], Machine]:
     start(MonitorNode, model='parameters')
     return lambda cut: Machine(bench, cut)
+
+
+def test_a_lathe_whose_blocks_come_seldom_is_not_said_to_send_nothing(
+    machine: Callable[[Cut], Machine], bench: Bench
+) -> None:
+    """At half of real time and a tick a second."""
+    log = bench.listen(Log, '/rosout', LATCHED)
+    states = bench.listen(String, '/chatter_monitor/state', LATCHED)
+    lathe = machine(STABLE)
+
+    def missed() -> int:
+        return sum('no samples come any more' in each.msg for each in log)
+
+    def wait(seconds: float) -> None:
+        until = time.monotonic() + seconds
+        bench.spin_until(lambda: time.monotonic() > until, 'time to pass')
+
+    for _ in range(3):  # before the third nobody knows how often they come
+        lathe.cut_at_once(1.0)
+        wait(2.0)
+    before, known = missed(), len(states)
+    for _ in range(3):
+        lathe.cut_at_once(1.0)
+        wait(2.0)
+    assert missed() == before
+    assert 'unknown' not in [each.data for each in states[known:]]
+    bench.spin_until(lambda: missed() == before + 1, 'a silence that is one')
 
 
 def test_chatter_is_flagged_with_its_figures_and_cured(

@@ -54,6 +54,23 @@ def test_counts_samples_flags_and_the_linear_models_verdict_are_in_the_run(tmp_p
     assert (before['open']['stable'], after['open']['stable']) == (True, False)
 
 
+def test_a_lathe_is_silent_once_it_takes_much_longer_than_usual() -> None:
+    lathe, log = VirtualLathe(), RunLog()
+    silences: list[bool] = []
+    # A block every three seconds, and a look every second; then no more.
+    for second in range(20):
+        if second % 3 == 0 and second < 12:
+            block = encode_block(lathe.advance(20))
+            log.receive('/lathe/samples', SAMPLES_TYPE, block, 0, (second + 1) * 10**9)
+        received = log.samples['/lathe/samples']
+        received.look(awaited=True)
+        silences.append(received.silent)
+    # How often they come is not known before the second; the last came at 9 s.
+    assert silences == [False, True, True, *[False] * 13, *[True] * 4]
+    received.look(awaited=False)
+    assert not received.silent
+
+
 def test_a_lathe_that_was_started_again_is_judged_by_its_own_parameters() -> None:
     run_log = RunLog()
     told = [(parameters_of(VirtualLathe()), 2), (parameters_of(VirtualLathe(cut=Cut(7000.0))), 12)]
