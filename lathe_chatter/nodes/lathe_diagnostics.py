@@ -77,6 +77,8 @@ class TickStatistics:
         self.lateness = Durations()
         self._before = _Mark(0, 0, 0.0, 0, 0, time.monotonic_ns())
         self._turned, self._speed = (0.0, 0.0), math.nan
+        self._reached, self._reached_since = 0.0, (0, time.monotonic_ns())
+        self._is_seldom = False
         self.begin_second()
 
     def note_tick(self, duration: int, lathe: VirtualLathe) -> None:
@@ -102,6 +104,8 @@ class TickStatistics:
         """Forget what belonged to the second that was reported."""
         now = time.monotonic_ns()
         requests = self._requests
+        if not self._is_seldom or self.ticks != self._reached_since[0]:
+            self._reached_since = self.ticks, now
         self._share_before = self.requests_share
         self._before = _Mark(
             self.ticks, self._pacer.overruns, self._pacer.lag, requests.served, requests.taken, now
@@ -141,14 +145,17 @@ class TickStatistics:
             clock: What is wrong with /clock; empty if nothing is.
             scheduling: Of the thread that ticks.
         """
-        elapsed = max(1, time.monotonic_ns() - self._before.at)
-        reached = (self.ticks - self._before.ticks) * self._tick / elapsed
+        ticks, since = self._reached_since
+        self._is_seldom = self._ticks_are_seldom(control)
+        if self.ticks != ticks or not self._is_seldom:
+            elapsed = max(1, time.monotonic_ns() - since)
+            self._reached = (self.ticks - ticks) * self._tick / elapsed
         level, message = self._verdict(control, asked, late, clock)
         p50, p99, largest = (q * _MICRO for q in self._steps.quantiles(0.5, 0.99, 1.0))
         late99, latest = (q * _MICRO for q in self.lateness.quantiles(0.99, 1.0))
         values = {
             'state': control.state.value,
-            'real-time factor': reached,
+            'real-time factor': self._reached,
             'real-time factor asked for': asked,
             'ticks': self.ticks,
             'overruns': self._pacer.overruns,
@@ -184,16 +191,24 @@ class TickStatistics:
             return OK, control.state.value
         return OK, 'as fast as possible' if asked == 0.0 else 'keeping up'
 
+    def _ticks_are_seldom(self, control: RunControl) -> bool:
+        """Whether one may take longer than the second that is reported."""
+        return control.state is RunState.RUNNING and self._pacer.period > 0.5 * SECOND
+
     def cutting(self, control: RunControl, lathe: VirtualLathe) -> Status:
         """The status of the cut."""
         made = self.ticks - self._before.ticks
         ticks = max(1, made)
+        engaged, in_cut = self._engaged, self._in_cut
+        under_way = not made and self._ticks_are_seldom(control)
+        if under_way:
+            engaged, in_cut = int(lathe.bearing_engaged), int(lathe.tool_in_cut)
         cut, asked = lathe.cut, lathe.cut.spindle_speed_rpm
         values = {
             'simulated time, s': lathe.time,
             'bearing contact': cut.bearing_contact.value,
-            'bearing engaged, fraction of ticks': self._engaged / ticks,
-            'tool in cut, fraction of ticks': self._in_cut / ticks,
+            'bearing engaged, fraction of ticks': engaged / ticks,
+            'tool in cut, fraction of ticks': in_cut / ticks,
             'guard': control.ended_because or GUARD_ON,
             'spindle speed, rev/min': self._speed if math.isfinite(self._speed) else asked,
             'spindle speed asked for, rev/min': asked,
@@ -204,10 +219,10 @@ class TickStatistics:
         if control.ended_because:
             return Status('cut', ERROR, control.ended_because, values)
         message = 'cutting'
-        if not made:
+        if not (made or under_way):
             message = 'at rest'
         elif not cut.depth_of_cut:
             message = 'no depth of cut'
-        elif not self._in_cut:
+        elif not in_cut:
             message = 'out of the cut'
         return Status('cut', OK, message, values)

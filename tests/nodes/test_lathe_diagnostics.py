@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from lathe_chatter.lathe import VirtualLathe
 from lathe_chatter.model import Cut as ModelCut
 from lathe_chatter.nodes.lathe_diagnostics import Durations, TickStatistics
-from lathe_chatter.nodes.real_time_loop import Pacer, RequestLoad
+from lathe_chatter.nodes.real_time_loop import SECOND, Pacer, RequestLoad
 from lathe_chatter.nodes.simulation_control import RunControl
 
 TICK = 2_000_000
@@ -68,6 +70,30 @@ def test_the_verdict_on_the_pace_says_what_is_wrong_first() -> None:
     assert cut.pace() == 'paused'
 
 
+def test_the_factor_reached_is_known_between_ticks_that_are_seldom(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [0]
+    monkeypatch.setattr(time, 'monotonic_ns', lambda: now[0])
+    cut = Cut(VirtualLathe())
+    cut.pacer.change(0.001, 0)  # a tick of 2 ms in 2 s
+    reached = []
+    for second in range(1, 9):
+        now[0] = second * SECOND
+        if second % 2 == 0:
+            cut.tick()
+        status = cut.statistics.pace(cut.control, asked=0.001, late=0.0, clock='', scheduling='')
+        reached.append(status.values['real-time factor'])
+        cut.statistics.begin_second()
+    assert reached[1:] == pytest.approx([0.001, *[0.001] * 6], rel=1e-6)
+    cut.control.pause(pause=True)
+    for second in range(9, 12):
+        now[0] = second * SECOND
+        status = cut.statistics.pace(cut.control, asked=0.001, late=0.0, clock='', scheduling='')
+        cut.statistics.begin_second()
+    assert status.values['real-time factor'] == 0.0
+
+
 def test_the_speed_is_the_one_that_the_spindle_turns_with() -> None:
     cut = Cut(VirtualLathe(spindle_acceleration=1000.0))
     for _ in range(2):
@@ -90,6 +116,10 @@ def test_the_status_of_the_cut_claims_no_more_than_the_ticks_showed() -> None:
     cut.tick()
     assert cut.cutting == 'cutting'
     cut.statistics.begin_second()
+    assert cut.cutting == 'at rest'
+    cut.pacer.change(0.002, 0)  # a tick a second
+    assert cut.cutting == 'cutting'
+    cut.control.pause(pause=True)
     assert cut.cutting == 'at rest'
     out = Cut(VirtualLathe(cut=ModelCut(feed_speed=0.0)))
     out.lathe.knock(-1.0)  # away from the workpiece
