@@ -33,7 +33,9 @@ except ImportError:  # not every installation of ROS 2 has it
 _START_PATIENCE = 60.0
 """s for the nodes to find each other: 20 where others keep the machine busy."""
 _DISCOVERY = 1.5
-"""s in which nodes that are there already become known."""
+"""s in which nodes that are there already become known, where the machine is idle."""
+_BUSY = 4.0
+"""Times that, at most, where it is busy: they may miss the first announcement, and the next."""
 _SETTLING = 0.3
 """s in which the graph has heard that nodes have ended."""
 _OURS = dict.fromkeys(
@@ -202,7 +204,8 @@ def _let_graph_settle(executor: SingleThreadedExecutor) -> None:
 
 def _look_around(operator: Operator, spin: Callable[[], None]) -> None:
     """See for a while whether the domain is free, before anything is started in it."""
-    until = time.monotonic() + _DISCOVERY
+    load = os.getloadavg()[0] / (os.cpu_count() or 1)
+    until = time.monotonic() + _DISCOVERY * min(max(1.0, load), _BUSY)
     while time.monotonic() < until:
         spin()
         _refuse_company(operator, {'lathe_operator': 1})
