@@ -32,10 +32,10 @@ except ImportError:  # not every installation of ROS 2 has it
 
 _START_PATIENCE = 60.0
 """s for the nodes to find each other: 20 where others keep the machine busy."""
-_DISCOVERY = 1.5
-"""s in which nodes that are there already become known, where the machine is idle."""
-_BUSY = 4.0
-"""Times that, at most, where it is busy: they may miss the first announcement, and the next."""
+_DISCOVERY = 3.5
+"""s in which nodes that are there already become known: DDS says each 3 s what got lost before."""
+_BUSY = 2.0
+"""Times that, at most, on a busy machine, where it may get lost again."""
 _SETTLING = 0.3
 """s in which the graph has heard that nodes have ended."""
 _OURS = dict.fromkeys(

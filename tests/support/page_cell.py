@@ -18,6 +18,8 @@ from support.node_processes import NodeProcesses
 
 PATIENCE = 120.0
 LAMP = 'document.querySelector("#lamp-word").textContent'
+OLD = r'What you see is old\.( Lost: \d+ by this page\.)?'
+"""What a page says whose figures hold no more, which may have lost samples before."""
 
 
 class Page:
