@@ -25,8 +25,9 @@ ALWAYS = ('/rosout', '/parameter_events')
 """Topics that are recorded in a pause as well: without them its end would be a riddle."""
 _LOOK_CLOSELY = 0.5
 """s after which the publishers of a topic are looked at even if they are as many as before."""
-_DISCOVERY = 1.0
-"""s after the start of a recording: what is found by then may have been there before."""
+_DISCOVERY = 3.5
+"""s after the start of a recording: what is found by then may be older: DDS says again after 3 s
+what got lost."""
 _EXPECTED = 5.0
 """s after the start of a recording by which somebody publishes what was asked for by name."""
 
