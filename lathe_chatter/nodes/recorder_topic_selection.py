@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from lathe_chatter.errors import LatheChatterError
+from lathe_chatter.nodes.listening_clock import DISCOVERY
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic, Write, topic_of
 from lathe_chatter.nodes.recorder_parameters import RECORDED_TOPICS
@@ -25,9 +26,6 @@ ALWAYS = ('/rosout', '/parameter_events')
 """Topics that are recorded in a pause as well: without them its end would be a riddle."""
 _LOOK_CLOSELY = 0.5
 """s after which the publishers of a topic are looked at even if they are as many as before."""
-_DISCOVERY = 3.5
-"""s after the start of a recording: what is found by then may be older: DDS says again after 3 s
-what got lost."""
 _EXPECTED = 5.0
 """s after the start of a recording by which somebody publishes what was asked for by name."""
 
@@ -219,7 +217,7 @@ class TopicWatch:
                 offers,
                 self._write,
                 since=self._since,
-                may_be_older=time.monotonic() < self._began + _DISCOVERY,
+                may_be_older=time.monotonic() < self._began + DISCOVERY,
             )
         except Exception as error:  # noqa: BLE001 -- of the middleware, about this topic alone
             self.refused[name] = kind

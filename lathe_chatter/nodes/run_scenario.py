@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from lathe_chatter.errors import NodeFailedError, RunFailedError
 from lathe_chatter.model.lathe_parameter_table import LATHE
 from lathe_chatter.nodes.end_signals import DeferredSignals
+from lathe_chatter.nodes.listening_clock import DISCOVERY
 from lathe_chatter.nodes.log_folder import ensure_log_folder
 from lathe_chatter.nodes.node_processes import ProcessGroup
 from lathe_chatter.nodes.operator_node import Operator, parameter_arguments
@@ -32,10 +33,8 @@ except ImportError:  # not every installation of ROS 2 has it
 
 _START_PATIENCE = 60.0
 """s for the nodes to find each other: 20 where others keep the machine busy."""
-_DISCOVERY = 3.5
-"""s in which nodes that are there already become known: DDS says each 3 s what got lost before."""
 _BUSY = 2.0
-"""Times that, at most, on a busy machine, where it may get lost again."""
+"""Times the usual time, at most, until others are known on a busy machine."""
 _SETTLING = 0.3
 """s in which the graph has heard that nodes have ended."""
 _OURS = dict.fromkeys(
@@ -205,7 +204,7 @@ def _let_graph_settle(executor: SingleThreadedExecutor) -> None:
 def _look_around(operator: Operator, spin: Callable[[], None]) -> None:
     """See for a while whether the domain is free, before anything is started in it."""
     load = os.getloadavg()[0] / (os.cpu_count() or 1)
-    until = time.monotonic() + _DISCOVERY * min(max(1.0, load), _BUSY)
+    until = time.monotonic() + DISCOVERY * min(max(1.0, load), _BUSY)
     while time.monotonic() < until:
         spin()
         _refuse_company(operator, {'lathe_operator': 1})

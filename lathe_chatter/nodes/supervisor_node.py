@@ -31,7 +31,7 @@ from lathe_chatter.model.lathe_parameter_table import (
 from lathe_chatter.model.machine_file import narrowed
 from lathe_chatter.model.parameter_table import Value
 from lathe_chatter.nodes.diagnostics import OK, WARN, Diagnostics, DiagnosticsListener, Status
-from lathe_chatter.nodes.listening_clock import ListeningClock
+from lathe_chatter.nodes.listening_clock import DISCOVERY, ListeningClock
 from lathe_chatter.nodes.monitor_sentences import TOOL_FREQUENCY
 from lathe_chatter.nodes.node_main import run_node
 from lathe_chatter.nodes.parameter_node import ParameterNode
@@ -74,6 +74,7 @@ class SupervisorNode(ParameterNode):
     def __init__(self, **options: Any) -> None:
         """Listen, and hold still until it is known who else is there."""
         super().__init__('chatter_supervisor', SUPERVISOR, **options)
+        self._began = time.monotonic()
         # Before there is any hurry: moves are rehearsed on a virtual lathe.
         precompile(LATHE_LOOP, MOVE_LOOPS, say=self.bounded_log.info)
         self._figures: dict[str, tuple[float, float]] = {}  # with the time of each
@@ -291,6 +292,7 @@ class SupervisorNode(ParameterNode):
         """Why nothing may be done, as the end of a sentence; empty where it may."""
         silent = self._listening.is_silent(self._heard_at, _SILENCE)
         reasons = {
+            'it is not known yet who else is there': time.monotonic() < self._began + DISCOVERY,
             _STOOD_STILL: silent and self._listening.stood_still_near(self._heard_at, _SILENCE),
             'nothing comes from the monitor': silent,
             'the monitor does not know the state of the cut': self._state == UNKNOWN,

@@ -424,6 +424,7 @@ def test_without_a_model_chatter_is_flagged_all_the_same(
     start(MonitorNode, model='none')
     flags = bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
     reports = bench.listen(DiagnosticArray, '/diagnostics')
+    bench.spin_until(lambda: flags, 'the flag as the monitor began')
     lathe = Machine(bench, STABLE)
     lathe.cut(3.0)
     lathe.lathe.retune(UNSTABLE)

@@ -45,6 +45,7 @@ class Shop:
     def monitor(self, **parameters: Any) -> MonitorNode:
         node: MonitorNode = self.start(MonitorNode, **{'model': 'parameters', **parameters})
         self.flags = self.bench.listen(Bool, '/chatter_monitor/chatter', LATCHED)
+        self.bench.spin_until(lambda: self.flags, 'the flag as the monitor began')
         return node
 
     def said(self) -> list[Log]:

@@ -597,6 +597,10 @@ SAID = {
             'the monitor has counted more lost ones within the last seconds',
             f'{SUPERVISOR}::test_what_it_says_of_itself_is_so',
         ),
+        'it is not known yet who else is there': (
+            'the node has begun less than 3.5 s ago, in which DDS says again what got lost',
+            f'{SUPERVISOR}::test_what_it_says_of_itself_is_so',
+        ),
         'there is another supervisor': (
             'the graph has another publisher of its actions',
             f'{SUPERVISOR}::test_of_two_supervisors_none_acts',

@@ -10,9 +10,12 @@ from contextlib import contextmanager
 
 import domain_coordinator
 
-# In another order in each process, and each in its turn: who was killed in a domain is heard of
-# there for 20 s more, and would be taken for somebody of the next test.
-_numbers = itertools.cycle(random.Random(os.getpid()).sample(range(1, 101), 100))
+# Each in its turn, in another order in each process, and to each worker its own: who was killed in
+# a domain is heard of there for 20 s more, and would be taken for somebody of the next test.
+_worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
+_workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+_mine = range(1 + _worker, 101, _workers)
+_numbers = itertools.cycle(random.Random(os.getpid()).sample(_mine, len(_mine)))
 
 
 @contextmanager
