@@ -7,7 +7,7 @@ import time
 
 DISCOVERY = 3.5
 """s after the start of a node by which it knows who was there: DDS says again after 3 s what got
-lost, and what is found by then may be older than the node."""
+lost."""
 _STOOD_STILL = 0.5
 """s between two readings after which the node was stopped, or busy: it listened to nobody."""
 _TICK = 1e-3

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from lathe_chatter.nodes.polled_subscription import PolledSubscription
+from lathe_chatter.nodes.polled_subscription import PolledSubscription, node_gids
 from lathe_chatter.nodes.topic_types import MessageType
 from lathe_chatter.recording import Topic
 from lathe_chatter.recording.ros_messages import LOG_TYPE, PARAMETER_EVENT_TYPE
@@ -21,6 +21,10 @@ from lathe_chatter.samples.codec import SAMPLES_TYPE
 
 _BACKLOG = 50_000
 """Messages that may wait here: 3 s of a lathe at 30 times real time."""
+_BACKLOG_HERE = 5000
+"""Of a publisher in this process, from whom Fast DDS takes nothing any more where so many wait."""
+_OF_PROCESS = 8
+"""Bytes of a gid that all of a process have: vendor, host and process."""
 _STREAMS = (SAMPLES_TYPE, LOG_TYPE, PARAMETER_EVENT_TYPE)
 """Types of which the latest message alone says nothing."""
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
@@ -41,8 +45,6 @@ class RecordedTopic:
         message_class: Of its type.
         offers: What its publishers offer.
         write: Where messages go.
-        since: When the recording began, ns since the epoch.
-        may_be_older: Whether it may have been there before this recording began.
 
     Attributes:
         messages: How many came.
@@ -50,35 +52,34 @@ class RecordedTopic:
         numbering: Says which did not come.
     """
 
-    def __init__(  # noqa: PLR0913 -- who, what, and where to
+    def __init__(
         self,
         node: Node,
         topic: Topic,
         message_class: Any,
         offers: list[TopicEndpointInfo],
         write: Write,
-        *,
-        since: int,
-        may_be_older: bool,
     ) -> None:
         """Subscribe."""
         self.topic = topic
         self.messages = 0
         self.paused = False
         self.numbering = Numbering()
-        # Who keeps little has replaced what it had: how much of that was before is not known.
-        self._kept = not may_be_older and all(_keeps(offer.qos_profile) for offer in offers)
-        self._since = since
         self._node = node
         self._write = write
         self._class = message_class
         self._met = len(offers)
-        self._subscribe(_matching(offers))
+        own = node_gids(node)[node.get_fully_qualified_name()]
+        self._process = {gid[:_OF_PROCESS] for gid in own}
+        self._subscribe(self._matching(offers))
 
     @property
     def lost(self) -> int:
-        """Messages that are missing: also before the first, where it should have come."""
-        return self.numbering.lost + (self.numbering.before if self._kept else 0)
+        """Messages that are missing between others: what was before the first is no loss.
+
+        A publisher does not say how many it keeps for who comes late.
+        """
+        return self.numbering.lost
 
     def reception(self) -> dict[str, int]:
         """What came, what is known to be lost, and how many were before the first."""
@@ -100,7 +101,7 @@ class RecordedTopic:
         """
         self._met = met
         self.numbering.settle(met, time.monotonic())
-        wanted = _matching(offers) if offers else self._qos
+        wanted = self._matching(offers) if offers else self._qos
         if _asks_less(wanted, self._qos):
             self.take()
             self._subscription.end()
@@ -111,6 +112,17 @@ class RecordedTopic:
         self.take()
         self.numbering.settle(self._met, math.inf)
         self._subscription.end()
+
+    def _matching(self, offers: list[TopicEndpointInfo]) -> QoSProfile:
+        """The most demanding profile that every publisher can serve, and a deep queue."""
+        profiles = [offer.qos_profile for offer in offers]
+        reliable, kept = all(map(_reliable, profiles)), all(map(_latched, profiles))
+        here = any(tuple(each.endpoint_gid)[:_OF_PROCESS] in self._process for each in offers)
+        return QoSProfile(
+            depth=_BACKLOG_HERE if here else _BACKLOG,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
+        )
 
     def _subscribe(self, qos: QoSProfile) -> None:
         self._qos = qos
@@ -125,8 +137,6 @@ class RecordedTopic:
             if number:
                 numbering.take(number, steady)
             published = info['source_timestamp']
-            if not (self.messages or taken) and published and published < self._since:
-                self._kept = False  # it was there before: its first messages are not lost
             taken += 1
             if not self.paused:
                 received = info['received_timestamp'] or time.time_ns()
@@ -144,11 +154,6 @@ def topic_of(name: str, kind: MessageType, offers: list[TopicEndpointInfo]) -> T
     return Topic(name, kind.name, kind.definition, kind.type_hash, profiles, repeated=repeated)
 
 
-def _keeps(qos: QoSProfile) -> bool:
-    """Whether a publisher keeps messages for late readers, without end."""
-    return _latched(qos) and bool(qos.lifespan == Infinite)
-
-
 def _latched(qos: QoSProfile) -> bool:
     return bool(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -157,20 +162,10 @@ def _reliable(qos: QoSProfile) -> bool:
     return bool(qos.reliability == ReliabilityPolicy.RELIABLE)
 
 
-def _matching(offers: list[TopicEndpointInfo]) -> QoSProfile:
-    """The most demanding profile that every publisher can serve, and a deep queue."""
-    profiles = [offer.qos_profile for offer in offers]
-    reliable, kept = all(map(_reliable, profiles)), all(map(_latched, profiles))
-    return QoSProfile(
-        depth=_BACKLOG,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
-    )
-
-
 def _asks_less(qos: QoSProfile, than: QoSProfile) -> bool:
-    """Whether there are publishers that serve the one profile and not the other."""
-    return (_reliable(than) and not _reliable(qos)) or (_latched(than) and not _latched(qos))
+    """Whether the one profile asks for less than the other, in whatever respect."""
+    less = (_reliable(than) and not _reliable(qos)) or (_latched(than) and not _latched(qos))
+    return less or qos.depth < than.depth
 
 
 def _profile(qos: QoSProfile) -> dict[str, Any]:

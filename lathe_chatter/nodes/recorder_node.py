@@ -336,6 +336,7 @@ class RecorderNode(ParameterNode):
         """Say from when there are samples, and where they are missing."""
         for topic, received in self._log.samples.items():
             if received.restarted:
+                received.restarted = False
                 self._remote.want_again(topic.removesuffix('/samples'))
             if who := mixture(self, topic, received):
                 self.bounded_log.error(who)

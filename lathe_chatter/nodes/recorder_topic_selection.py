@@ -13,7 +13,6 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from lathe_chatter.errors import LatheChatterError
-from lathe_chatter.nodes.listening_clock import DISCOVERY
 from lathe_chatter.nodes.parameter_node import ParameterNode
 from lathe_chatter.nodes.recorded_subscription import RecordedTopic, Write, topic_of
 from lathe_chatter.nodes.recorder_parameters import RECORDED_TOPICS
@@ -115,7 +114,7 @@ class TopicWatch:
         self._several: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._look_closely, self._warned = 0.0, False
-        self._since, self._began = time.time_ns(), time.monotonic()
+        self._began = time.monotonic()
 
     def look(self, on_publisher: Callable[[str, str], None], *, closely: bool = False) -> None:
         """Subscribe to what has appeared, and follow the others.
@@ -210,15 +209,7 @@ class TopicWatch:
             self._former[name] = self._counted(former)
             self._node.bounded_log.info(f'{name} is now of type {kind}, and recorded as such.')
         try:
-            recorded = RecordedTopic(
-                self._node,
-                topic,
-                found.message_class,
-                offers,
-                self._write,
-                since=self._since,
-                may_be_older=time.monotonic() < self._began + DISCOVERY,
-            )
+            recorded = RecordedTopic(self._node, topic, found.message_class, offers, self._write)
         except Exception as error:  # noqa: BLE001 -- of the middleware, about this topic alone
             self.refused[name] = kind
             said = ' '.join(str(error).split())

@@ -66,6 +66,7 @@ class SamplesReceived:
         longest: The longest time from one block to the next, s.
         pauses: Simulated times before and after what the recorder left out in pauses, s.
         complaint: What is wrong with the layout of a message; empty where all is well.
+        restarted: Whether a lathe began again since this was taken back.
         mixture: Who sends at once what only one may, a sentence of the recorder; else empty.
         discontinuities: The latest places where samples are missing or begin, until they are
             logged.
@@ -79,6 +80,7 @@ class SamplesReceived:
     longest: float = 0.0
     pauses: list[tuple[float, float]] = field(default_factory=list)
     complaint: str = ''
+    restarted: bool = False
     mixture: str = ''
     discontinuities: deque[Discontinuity] = field(
         default_factory=lambda: deque(maxlen=_MAX_DISCONTINUITIES)
@@ -133,11 +135,7 @@ class SamplesReceived:
         if order is BlockOrder.FIRST:
             self.first, self.head = first, missing
         self.discontinuities.append(Discontinuity(order, before, first, missing))
-
-    @property
-    def restarted(self) -> bool:
-        """Whether a lathe began again, and that is not logged yet."""
-        return any(each.order is BlockOrder.RESTART for each in self.discontinuities)
+        self.restarted |= order is BlockOrder.RESTART
 
     def look(self, *, awaited: bool) -> None:
         """Notice once a second whether samples have come, where they are awaited."""

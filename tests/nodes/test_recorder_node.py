@@ -100,23 +100,51 @@ def test_a_recorder_loads_nothing_that_computes(domain: int, tmp_path: Path) -> 
     assert not loaded & COMPUTING
 
 
-@pytest.mark.parametrize(('found_after', 'lost'), [(2.0, 0), (3.6, 49)])
-def test_a_loss_on_the_way_is_counted_where_it_cannot_be_older_than_the_recording(
-    start: Start, bench: Bench, spin_until: Any, tmp_path: Path, found_after: float, lost: int
+def test_a_loss_on_the_way_is_counted(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
 ) -> None:
-    """A publisher that is there becomes known after up to 3 s, where DDS has to say it again."""
     recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
-    began = time.monotonic()
-    spin_until(lambda: time.monotonic() > began + found_after, 'the end of the discovery')
-    # Keeps one message only: all but the last are gone before the recorder finds the topic.
+    sent = bench.overflow('/n', lambda: recorder.messages_of('/n') == 1)
+    spin_until(lambda: recorder.lost_of('/n'), 'the loss')
+    lost = sent - recorder.messages_of('/n')
+    assert recorder.lost_of('/n') == lost
+    assert f'{lost} were lost' in recorder.stop().message
+    (told,) = [each.text for each in verify(tmp_path / 'run').findings if each.loss]
+    assert told.startswith(f'/n: {lost} messages are missing between ')
+
+
+def test_what_a_publisher_replaced_before_it_was_found_is_not_lost_but_noted(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    """How many it keeps, it does not say: recorder and `verify` agree."""
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'), topics=['/n'])
     publisher = bench.node.create_publisher(
         Float64, '/n', QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     )
     for k in range(50):
         publisher.publish(Float64(data=float(k)))
     spin_until(lambda: recorder.messages_of('/n') == 1, 'the message that was kept')
-    assert recorder.lost_of('/n') == lost
-    assert f'{lost} were lost' in recorder.stop().message
+    assert '0 were lost' in recorder.stop().message
+    found = verify(tmp_path / 'run')
+    assert found.complete
+    noted = '/n: the record begins with message 50 of its publisher.'
+    assert noted in [finding.text for finding in found.findings]
+
+
+def test_a_lathe_that_began_again_is_asked_once_for_its_parameters(
+    start: Start, bench: Bench, spin_until: Any, tmp_path: Path
+) -> None:
+    """Also while the sentence of it waits: each answer is one more lathe in the record."""
+    recorder = start(RecorderNode, output=str(tmp_path / 'run'))
+    start(LatheNode)
+    answers = recorder._noted
+    spin_until(lambda: answers.get('/lathe'), 'its parameters')
+    assert bench.trigger('/lathe/reset').success
+    bench.pause('/lathe', pause=False)
+    spin_until(lambda: len(answers['/lathe']) == 2, 'its parameters again')
+    until = time.monotonic() + 5.0
+    spin_until(lambda: time.monotonic() > until, 'another answer')
+    assert len(answers['/lathe']) == 2
 
 
 def test_an_existing_folder_is_refused(start: Start, tmp_path: Path) -> None:

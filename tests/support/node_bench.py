@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -12,9 +13,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
 from lathe_chatter.array_types import Array
+from lathe_chatter.nodes.recorded_subscription import _BACKLOG_HERE
 from lathe_chatter.samples.codec import SampleDecoder
 
 DEEP = QoSProfile(depth=5000)
@@ -66,6 +69,15 @@ class Bench:
     def talk_alone(self, kind: Any, topic: str) -> Any:
         """A publisher to whom nobody need listen."""
         return self.node.create_publisher(kind, topic, DEEP)
+
+    def overflow(self, topic: str, first_came: Callable[[], object]) -> int:
+        """Send a recorder more numbers than have room, after one that has come; how many."""
+        publisher = self.talk(Float64, topic)
+        publisher.publish(Float64())
+        self.spin_until(first_came, 'the first')
+        for _ in range(2 * _BACKLOG_HERE):
+            publisher.publish(Float64())
+        return 1 + 2 * _BACKLOG_HERE
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
         """The answer of a service."""
