@@ -112,7 +112,9 @@ class Browser:
         until = time.monotonic() + patience
         plain = f'(async v => (v = await v) instanceof Element ? v.outerHTML : v)({script})'
         while not (value := self.run(plain)):
-            assert time.monotonic() < until, f'{what} did not come: {self.complaints}'
+            if time.monotonic() >= until:
+                seen = self.run('document.body?.innerText')
+                raise AssertionError(f'{what} did not come: {self.complaints}; one sees:\n{seen}')
             time.sleep(0.05)
         return value
 
