@@ -153,6 +153,8 @@ def test_what_was_set_before_a_scenario_can_be_had_back(browser: Browser) -> Non
 
 def test_a_reset_while_paused_leaves_nothing_of_the_cut_before(browser: Browser) -> None:
     operate(browser)
+    # Also on its bearing, on which 0.5 mm goes on to chatter where it was hit.
+    browser.enter('#p-depth_of_cut', '0.3')
     browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
     browser.click('[data-call=pause]')
     browser.until(f'{CLOCK}.includes("paused")', 'the pause')
@@ -164,6 +166,8 @@ def test_a_reset_while_paused_leaves_nothing_of_the_cut_before(browser: Browser)
     assert browser.run(LAMP) == 'unknown'
     browser.click('[data-call=resume]')
     browser.until(f'{LAMP} === "stable"', 'a stable cut', PATIENCE)
+    browser.enter('#p-depth_of_cut', '0.5')
+    browser.until('cell.lathe_values.depth_of_cut === 0.0005', 'the cut before')
     assert browser.complaints == []
 
 
