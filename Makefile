@@ -8,8 +8,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export PYTHON ?=
 ARGS ?=
 # A worker more than the two cores that are there at least: many tests wait for ROS.
-# In their order, for sorted by their number the few that take longest would come last.
-PYTEST = -m pytest -n 3 --dist loadfile --no-loadscope-reorder
+PYTEST = -m pytest -n 3 --dist loadfile
 TALKS_TO_ROS = tests/nodes tests/cli/test_run.py
 RUN_ENDS = the_clearance_makes_it_chatter_and_the_recommended_speed_cures_it \
   an_interrupted_run_is_complete_up_to_then

@@ -23,8 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def one_run(words: Sequence[str], cores: int) -> tuple[str, list[str], float, bool]:
     """The counts, the tests that failed, the seconds, and whether all was well."""
-    how = ['-n', '3', '--dist', 'loadfile', '--no-loadscope-reorder']  # as in the Makefile
-    command = [sys.executable, '-m', 'pytest', '-q', *how, *words]
+    command = [sys.executable, '-m', 'pytest', '-q', '-n', '3', '--dist', 'loadfile', *words]
     with ExitStack() as stack:
         for _ in range(cores):
             busy = subprocess.Popen([sys.executable, '-c', 'while True: pass'])
