@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.browser import Browser, chromium
-from support.page_cell import LAMP, OLD, PATIENCE, Page, header_of, operate, recorded_cell
+from support.page_cell import LAMP, PATIENCE, Page, header_of, old_words, operate, recorded_cell
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -323,7 +323,7 @@ def test_a_killed_lathe_is_told_and_is_back_by_itself(page: Page, browser: Brows
     browser.until('document.querySelector("#gone").textContent.includes("/lathe is silent")', '')
     assert browser.run(LAMP) == 'unknown'
     assert browser.run('document.querySelector("#lamp").className').strip() == 'lamp'
-    assert re.fullmatch(OLD, browser.text('#health'))
+    assert browser.text('#health') == old_words(browser)
     browser.run('takeCell({figures: {recommended_speed_rpm: 4000}}), showFigures()')
     assert browser.run('document.querySelector("#take-recommended").disabled')
     browser.click('#knock')
@@ -342,7 +342,7 @@ def test_a_killed_page_is_told_and_is_back_by_itself(page: Page, browser: Browse
     said = 'document.querySelector("#gone").textContent'
     browser.until(f'{said}.includes("does not answer")', 'that it is gone')
     assert browser.run(LAMP) == 'unknown'
-    assert re.fullmatch(OLD, browser.text('#health'))
+    assert browser.text('#health') == old_words(browser)
     assert browser.run('document.querySelector("#p-depth_of_cut").disabled')
     page.start('operator_page', f'port:={port}')
     browser.until('document.querySelector("#gone").hidden && signals', 'the page', PATIENCE)

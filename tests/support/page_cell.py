@@ -18,8 +18,6 @@ from support.node_processes import NodeProcesses
 
 PATIENCE = 120.0
 LAMP = 'document.querySelector("#lamp-word").textContent'
-OLD = r'What you see is old\.( Lost: \d+ by this page\.)?'
-"""What a page says whose figures hold no more, which may have lost samples before."""
 
 
 class Page:
@@ -87,3 +85,9 @@ def operate(browser: Browser) -> None:
     if browser.run('document.querySelector("#operate").getAttribute("aria-pressed")') != 'true':
         browser.click('#operate')
         browser.until('server.operating', 'the right to act')
+
+
+def old_words(browser: Browser) -> str:
+    """What a page has to say whose figures hold no more, by what it has lost before."""
+    lost = browser.run('signals?.lost ?? 0')
+    return 'What you see is old.' + (f' Lost: {lost} by this page.' if lost else '')
